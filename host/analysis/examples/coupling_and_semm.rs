@@ -1,11 +1,13 @@
-//! The other way round: from parts and a joint to the assembly, and a model corrected by a measurement.
+//! The forward direction: from parts and a joint to the assembly, and a model corrected by a
+//! measurement.
 //!
 //! ```sh
 //! cargo run -p jointrig-analysis --example coupling_and_semm
 //! ```
 //!
-//! A.csv and B.csv are coupled by a joint whose stiffness is 20 % too low, and the result is compared with the measured assembly,
-//! AJB.csv. Then SEMM corrects this model by what was measured on A alone, and the FRFs on B get better too.
+//! A.csv and B.csv are coupled by a joint whose stiffness is 20 % too low, and the result is
+//! compared with the measured assembly, AJB.csv. Then SEMM corrects this model with the measurement
+//! on A alone, which improves the FRFs on B as well.
 
 mod csv;
 
@@ -23,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let difference = boolean_difference(2);
     let mut coupled = Vec::new();
     for (line, y) in parts.lines().iter().enumerate() {
-        // the joint's own mobility, s/k
+        // the joint's mobility, s/k
         let joint =
             DMatrix::from_fn(
                 2,

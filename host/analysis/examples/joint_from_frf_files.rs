@@ -4,8 +4,9 @@
 //! cargo run -p jointrig-analysis --example joint_from_frf_files
 //! ```
 //!
-//! Two bodies were hit at one point each, along y and z: alone (A.csv, B.csv) and joined (AJB.csv). The files hold mobilities
-//! under an exponential window of 2.3 1/s. They were computed for a contact of 260 N/µm along y and 180 N/µm along z.
+//! Two bodies were hit at one point each, along y and z: alone (A.csv, B.csv) and joined (AJB.csv).
+//! The files hold mobilities measured with an exponential window of 2.3 1/s. They were computed for
+//! a contact of 260 N/µm along y and 180 N/µm along z.
 
 mod csv;
 
@@ -40,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A sensor and the hits of one body, all at the contact itself.
+/// A sensor on one body and the hits on it, all at the contact.
 fn points(body: &str, grouping: Grouping) -> Configuration {
     let point = |name: String, description: String, direction| Point {
         name,

@@ -4,8 +4,9 @@
 //! cargo run -p jointrig-analysis --example loop_to_kt
 //! ```
 //!
-//! A shaker moves a contact by ±3 µm at 100 Hz. loop.csv holds the velocities beside the contact and the tangential force, 10 240
-//! samples per second. They were computed for a Jenkins contact: a spring of 180 N/µm that slides at 150 N.
+//! A shaker moves a contact by ±3 µm at 100 Hz. loop.csv holds the velocities on both sides of the
+//! contact and the tangential force, 10 240 samples per second. They were computed for a Jenkins
+//! contact: a spring of 180 N/µm that slides at 150 N.
 
 mod csv;
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// A frequency band, Hz; both ends belong to it. In files it is `[low, high]`.
+/// A frequency band, Hz, both ends included. In files it is `[low, high]`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 #[serde(into = "[f64; 2]")]
 pub struct Band {
@@ -13,7 +13,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Whether the line belongs to the band.
+    /// Whether the line is in the band.
     pub fn contains(&self, frequency_hz: f64) -> bool {
         (self.low_hz..=self.high_hz).contains(&frequency_hz)
     }

@@ -1,30 +1,35 @@
-//! Regressions whose regressors are noisy: how much of an information matrix noise only feigns.
+//! Regressions with noisy regressors: which part of an information matrix is only due to noise.
 //!
-//! With J the information formed from noisy regressors and N what their noise adds to it in the mean, the curvature is J − N and the slope at
-//! the truth scatters by J: the estimate's covariance is (J − N)⁻¹ J (J − N)⁻¹. In units in which J is the identity, N has eigenvalues from 0
-//! to about 1, the feigned fraction of each axis; sums of finitely many lines scatter, so that J − N itself need not be positive.
+//! With J the information formed from noisy regressors and N the mean contribution of their noise
+//! to it, the curvature is J − N and the slope at the true value scatters by J: the estimate's
+//! covariance is (J − N)⁻¹ J (J − N)⁻¹. In units in which J is the identity, the eigenvalues of N
+//! are from 0 to about 1: the fraction of the information along each axis that is due to noise.
+//! Sums of finitely many lines scatter, so J − N itself need not be positive.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A fraction of information smaller than the square of a rounding error.
+/// Entries below the square of the rounding error are set to zero.
 const NOTHING: f64 = f64::EPSILON * f64::EPSILON;
 
-/// The axes along which noise feigns information, and how much.
+/// The axes of the information matrix and the fraction of information along each that is due to
+/// noise.
 #[derive(Debug, Clone)]
 pub struct Feigned {
     /// Columns x with xᵀ J x = 1.
     axes: DMatrix<f64>,
-    /// xᵀ N x of each.
+    /// xᵀ N x for each column.
     fraction: DVector<f64>,
 }
 
 impl Feigned {
-    /// Of J and N, both n × n and symmetric; none where J is not positive, or either is no number.
+    /// From J and N, both n × n and symmetric; `None` if J is not positive, or if either contains
+    /// values that are not finite.
     pub fn of(information: DMatrix<f64>, noise: &DMatrix<f64>) -> Option<Self> {
         let root = information.cholesky()?.l();
         let half = root.solve_lower_triangular(noise)?;
         let mut fractions = root.solve_lower_triangular(&half.transpose())?;
-        // fractions of one that are below any rounding; their squares vanish, and with them the lengths that the eigensolver divides by
+        // entries below any rounding error; their squares underflow, and with them the lengths that
+        // the eigensolver divides by
         fractions.apply(|entry| {
             if entry.abs() < NOTHING {
                 *entry = 0.0;
@@ -36,7 +41,8 @@ impl Feigned {
         numbers.then_some(Feigned { axes, fraction: found.eigenvalues })
     }
 
-    /// Σ weight(fraction) x xᵀ over the axes: with 1/(1 − f) the inverse of J − N, with 1/(1 − f)² the estimate's covariance.
+    /// Σ weight(fraction) x xᵀ over the axes: with 1/(1 − f) the inverse of J − N, with 1/(1 − f)²
+    /// the estimate's covariance.
     pub fn weighed(&self, weight: impl Fn(f64) -> f64) -> DMatrix<f64> {
         &self.axes * DMatrix::from_diagonal(&self.fraction.map(weight)) * self.axes.transpose()
     }
@@ -48,7 +54,8 @@ mod tests {
 
     #[test]
     fn what_is_known_exactly_does_not_break_the_rest() {
-        // the last is known so well that in units of its own, whatever noise adds to it vanishes when squared
+        // the last parameter is known so precisely that, in its own units, the square of any noise
+        // contribution underflows
         let mut noise = DMatrix::from_diagonal_element(3, 3, 0.25);
         noise.row_mut(2).fill(1e-170);
         noise.column_mut(2).fill(1e-170);

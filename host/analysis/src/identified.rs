@@ -1,11 +1,13 @@
-//! When a stiffness counts as identified: up to here it is given as a number, beyond only said not to be known.
+//! Limits for reporting a stiffness: within them its value is given, beyond them it is reported as
+//! not identified.
 
-/// Of the averaged estimate: half width of the compliance's 95 % interval over the compliance. Above it the compliance cannot be
-/// told from zero well enough, so that the stiffness has no upper limit worth a name.
+/// For the averaged estimate: half width of the compliance's 95 % interval over the compliance.
+/// Above it the compliance is too close to zero, relative to its uncertainty, for the stiffness to
+/// have a useful upper limit.
 pub const COMPLIANCE_HALF_WIDTH: f64 = 0.6;
 
-/// Of the fit: half width of the stiffness' 95 % interval over the stiffness.
+/// For the fit: half width of the stiffness' 95 % interval over the stiffness.
 pub const FITTED_HALF_WIDTH: f64 = 0.6;
 
-/// Of a band's mean: standard deviation of the lines' stiffness over their mean.
+/// For a band's mean: standard deviation of the lines' stiffness over their mean.
 pub const SCATTER_OF_LINES: f64 = 1.5;

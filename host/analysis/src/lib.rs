@@ -1,12 +1,13 @@
-//! The stiffness of a joint from measurements: impact spectra, frequency-based substructuring, hysteresis loops.
+//! The stiffness of a joint from measurements: impact spectra, frequency-based substructuring,
+//! hysteresis loops.
 //!
-//! Arrays and geometry in, numbers out: nothing here knows of devices, files or screens. Stiffness is in N/m, time in seconds,
-//! and every FRF is on a line s = σ + i2πf.
+//! Input is arrays and geometry, output is numbers: this crate does not access devices, files or
+//! screens. Stiffness is in N/m, time in seconds, and every FRF is on a line s = σ + i2πf.
 //!
 //! # A joint in ten lines
 //!
-//! Two masses, alone and joined by a spring of 180 N/µm. In a measurement the three admittances come from hits; here they are
-//! written down. What couples the masses is found again from them:
+//! Two masses, alone and joined by a spring of 180 N/µm. In a measurement the three admittances
+//! come from hits; here they are written in closed form. The spring is then identified from them:
 //!
 //! ```
 //! use jointrig_analysis::substructuring::{decoupling::interface, joint_over_bands::stiffness_and_damping};
@@ -24,14 +25,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # Where to go on
+//! # Further reading
 //!
-//! - FRFs of many lines, points and directions: [`substructuring::identify`](fn@substructuring::identify) does all of it;
+//! - FRFs of many lines, points and directions:
+//!   [`substructuring::identify`](fn@substructuring::identify) performs the whole identification;
 //!   [`substructuring::averaged`] gives the value to quote, with its interval.
 //! - FRFs from the records of a hammer: [`spectra::estimate`](fn@spectra::estimate).
 //! - k_T from a record of a sliding contact: [`hysteresis::analyse`](fn@hysteresis::analyse).
 //!
-//! The feature `rayon` uses every core; results are the same to the last bit with and without it.
+//! The feature `rayon` uses all cores; results are bit-identical with and without it.
 #![forbid(unsafe_code)]
 
 pub mod band;

@@ -1,23 +1,25 @@
-//! The middle value of many: what is left of a record when pulses and bursts do not count.
+//! Median of long records, used as an estimate that is robust against pulses and bursts.
 
 use crate::vectors::wide;
 use pulp::NullaryFnOnce;
 
-/// Values below which the whole is searched at once.
+/// With fewer values, all of them are searched directly.
 const FEW: usize = 4096;
-/// Values of the sample that tells about where the middle is.
+/// Size of the sample that brackets the median.
 const SAMPLE: usize = 1024;
-/// So far from its middle the sample is trusted, ranks: four standard deviations (√1024 / 2 = 16).
+/// Width of the bracket around the sample's median, ranks: four standard deviations (√1024 / 2 =
+/// 16).
 const MARGIN: usize = 64;
 
-/// Values that are looked at together for some that lie between.
+/// Values that are tested together for any inside the bracket.
 const BLOCK: usize = 64;
 
-/// The value at half the length of the sorted list, by [`f64::total_cmp`]; none of nothing.
+/// The value at half the length of the list sorted by [`f64::total_cmp`]; `None` for an empty list.
 ///
-/// A sample tells about where it is. Of a coarse signal, whose values are few and come often, the sample's own middle is it already, and
-/// needs only to be counted. Else what is between two values of the sample is searched. Where the sample was wrong, as it may be of a periodic
-/// record, everything is.
+/// A sample brackets the median. For a coarsely quantised signal, whose few values recur often, the
+/// sample's median is already the result, and only needs to be confirmed by counting. Otherwise the
+/// values between two values of the sample are searched. If the bracket was wrong, as can happen
+/// for a periodic record, all values are searched.
 pub fn middle(values: &[f64]) -> Option<f64> {
     let at = values.len() / 2;
     let all = || values.iter().map(|v| key(*v)).collect::<Vec<i64>>();
@@ -50,7 +52,7 @@ pub fn middle(values: &[f64]) -> Option<f64> {
     Some(value(*between.select_nth_unstable(at - below).1))
 }
 
-/// How many keys are below `from`, and how many between it and `to`, both included.
+/// Counts the keys below `from`, and those from `from` to `to` inclusive.
 struct Counted<'a> {
     values: &'a [f64],
     from: i64,
@@ -73,7 +75,7 @@ impl NullaryFnOnce for Counted<'_> {
     }
 }
 
-/// A whole number in the order of [`f64::total_cmp`]; whole numbers compare quicker.
+/// Maps a value to an integer of the same order as [`f64::total_cmp`]; integers compare faster.
 #[expect(clippy::inline_always, reason = "called where the processor's vectors are known")]
 #[inline(always)]
 fn key(value: f64) -> i64 {
@@ -81,7 +83,7 @@ fn key(value: f64) -> i64 {
     bits ^ ((bits >> 63).cast_unsigned() >> 1).cast_signed()
 }
 
-/// What `key` was made of: it is its own inverse.
+/// The value of a key; the bit operation is its own inverse.
 fn value(key: i64) -> f64 {
     f64::from_bits((key ^ ((key >> 63).cast_unsigned() >> 1).cast_signed()).cast_unsigned())
 }
@@ -103,7 +105,8 @@ mod tests {
         let mut stream = Xoshiro256PlusPlus::seed_from_u64(5);
         for n in (0..40).chain([FEW - 1, FEW, FEW + 1, 51_199, 102_400]) {
             let noise: Vec<f64> = (0..n).map(|_| stream.random_range(-1.0..1.0)).collect();
-            // few different values, as of a quiet channel; rising; a wave in step with the sample; zeros of both signs
+            // few different values, as in a quiet channel; rising; a wave whose period divides the
+            // sampling step; zeros of both signs
             let coarse = noise.iter().map(|v| (v * 3.0).round()).collect();
             let rising = (0..n).map(|i| i as f64 - 9.0).collect();
             let wave = (0..n).map(|i| ((i % 100) as f64 - 50.0) / 7.0).collect();

@@ -1,13 +1,15 @@
-//! Loops over lines, hits and outputs: on every core with the feature `rayon`, one after the other without it.
+//! Loops over lines, hits and outputs: on all cores with the feature `rayon`, sequentially without
+//! it.
 //!
-//! Only maps run here; what is summed is summed in order afterwards, so that results are equal to the last bit either way.
+//! Only maps run in parallel; sums are formed in order afterwards, so results are bit-identical
+//! either way.
 
 #[cfg(feature = "rayon")]
 pub(crate) use rayon::{current_num_threads as threads, join, prelude};
 #[cfg(not(feature = "rayon"))]
 pub(crate) use serial::{join, prelude, threads};
 
-/// The same names without threads.
+/// The same names, implemented without threads.
 #[cfg(not(feature = "rayon"))]
 mod serial {
     pub(crate) fn threads() -> usize {
@@ -59,7 +61,7 @@ mod serial {
         }
 
         pub(crate) trait Shares: Iterator + Sized {
-            /// One core has no use for shares.
+            /// Without threads the minimum chunk size has no effect.
             fn with_min_len(self, _items: usize) -> Self {
                 self
             }

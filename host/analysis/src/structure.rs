@@ -1,4 +1,4 @@
-//! What is measured: the two parts alone, and both joined.
+//! The structures that are measured: the two parts alone, and both joined.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -16,10 +16,10 @@ pub enum Structure {
 }
 
 impl Structure {
-    /// All of them, in their order.
+    /// All structures, in order.
     pub const ALL: [Structure; 3] = [Structure::A, Structure::B, Structure::Ajb];
 
-    /// The word used in files.
+    /// The name used in files.
     pub fn name(self) -> &'static str {
         match self {
             Structure::A => "A",
@@ -46,24 +46,24 @@ impl From<Structure> for String {
     }
 }
 
-/// One thing of each structure.
+/// One value for each structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Abc<T> {
-    /// Of A alone.
+    /// For A alone.
     pub a: T,
-    /// Of B alone.
+    /// For B alone.
     pub b: T,
-    /// Of the assembly.
+    /// For the assembly.
     pub ajb: T,
 }
 
 impl<T> Abc<T> {
-    /// What `of` makes of each structure.
+    /// The value that `of` returns for each structure.
     pub fn of(mut of: impl FnMut(Structure) -> T) -> Self {
         Abc { a: of(Structure::A), b: of(Structure::B), ajb: of(Structure::Ajb) }
     }
 
-    /// That of one structure.
+    /// The value of one structure.
     pub fn get(&self, structure: Structure) -> &T {
         match structure {
             Structure::A => &self.a,
@@ -72,7 +72,7 @@ impl<T> Abc<T> {
         }
     }
 
-    /// That of one structure, to be changed.
+    /// Mutable access to the value of one structure.
     pub fn get_mut(&mut self, structure: Structure) -> &mut T {
         match structure {
             Structure::A => &mut self.a,
@@ -81,24 +81,24 @@ impl<T> Abc<T> {
         }
     }
 
-    /// Each made into something else.
+    /// Applies `to` to each value.
     pub fn map<U>(self, mut to: impl FnMut(T) -> U) -> Abc<U> {
         Abc { a: to(self.a), b: to(self.b), ajb: to(self.ajb) }
     }
 
-    /// Each borrowed.
+    /// A reference to each value.
     pub fn as_ref(&self) -> Abc<&T> {
         Abc { a: &self.a, b: &self.b, ajb: &self.ajb }
     }
 
-    /// Each with its structure, in order.
+    /// Each value with its structure, in order.
     pub fn each(self) -> [(Structure, T); 3] {
         [(Structure::A, self.a), (Structure::B, self.b), (Structure::Ajb, self.ajb)]
     }
 }
 
 impl<T> Abc<Option<T>> {
-    /// All three, or none if one is missing.
+    /// All three values, or `None` if one is missing.
     pub fn all(self) -> Option<Abc<T>> {
         Some(Abc { a: self.a?, b: self.b?, ajb: self.ajb? })
     }

@@ -1,29 +1,31 @@
-//! Loops over long rows, with the widest vectors that the processor at hand has.
+//! Loops over long arrays, with the widest vector instructions of the processor in use.
 //!
-//! What is shipped runs on every x86-64 and every aarch64, so that the compiler may use two numbers at a time; most machines
-//! have four, newer ones eight. Which a loop gets is found out when it runs. Each number is computed by the same operations either way: results are equal to the
-//! last bit.
+//! Distributed binaries must run on every x86-64 and aarch64 processor, for which the compiler may
+//! process two numbers at a time; most machines have four, newer ones eight. The width is selected
+//! at run time. Each number is computed by the same operations either way, so results are
+//! bit-identical.
 
 use pulp::{Arch, WithSimd};
 
-/// Does `work`, a loop that is inlined with all that it calls, compiled for this processor. A closure of more than a few lines is not
-/// inlined: that takes a type with a `call` that always is. A work that has to know how many numbers a vector holds is told.
+/// Runs `work`, a loop that is inlined with everything it calls, compiled for this processor.
+/// Closures of more than a few lines are not inlined; use a type with an always-inlined `call`
+/// instead. A `work` that needs the number of values per vector receives it.
 #[inline]
 pub(crate) fn wide<T>(work: impl WithSimd<Output = T>) -> T {
     Arch::new().dispatch(work)
 }
 
-/// Values that are looked at side by side.
+/// Number of values processed in parallel.
 const LANES: usize = 8;
 
-/// Whether all are numbers.
+/// Whether all values are finite.
 pub(crate) fn all_finite(x: &[f64]) -> bool {
-    // blocks without branches inside are several values per cycle
+    // blocks without branches process several values per cycle
     let fine = |block: &[f64]| wide(|| block.iter().fold(true, |fine, v| fine & v.is_finite()));
     x.chunks(512).all(fine)
 }
 
-/// The largest value; −∞ of nothing. What is not a number does not count.
+/// The largest value; −∞ for an empty array. NaN is ignored.
 pub(crate) fn largest(x: &[f64]) -> f64 {
     let (lanes, rest) = x.as_chunks::<LANES>();
     let mut most = [f64::NEG_INFINITY; LANES];

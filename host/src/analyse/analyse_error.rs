@@ -1,19 +1,19 @@
-//! Why a campaign file says nothing.
+//! Errors of the analysis of a campaign file.
 
 use crate::campaign::store::error::StoreError;
 
-/// Why a campaign file cannot be analysed, or a cell of it not be read.
+/// Why a campaign file cannot be analysed, or one of its cells cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum AnalyseError {
     /// The file cannot be read, or a record is damaged.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A channel is not there without which an impact cannot be analysed.
+    /// A channel that is required for analysing an impact is missing.
     #[error("record {record}: its session has no channel for {role}")]
     NoChannel {
         /// The record.
         record: i64,
-        /// What is missing.
+        /// The missing channel.
         role: &'static str,
     },
     /// One cell has records of two sampling rates.
@@ -25,10 +25,11 @@ pub enum AnalyseError {
         record: i64,
         /// Its rate, Hz.
         rate_hz: f64,
-        /// That of the records before it, Hz.
+        /// Rate of the earlier records, Hz.
         others_hz: f64,
     },
-    /// The response channels of the file's sessions measure different quantities, or none that is motion.
+    /// The response channels of the file's sessions measure different quantities, or a quantity
+    /// that is not motion.
     #[error(
         "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
     )]

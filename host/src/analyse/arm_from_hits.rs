@@ -1,4 +1,5 @@
-//! The static arm from hits on B alone, where the hammer is the force at the contact.
+//! Identifies the static arm from hits on B alone, where the force at the contact is that of the
+//! hammer.
 
 use super::averages::CellAverage;
 use super::missing::Missing;
@@ -12,12 +13,15 @@ use nalgebra::Vector3;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Where the fit reads, Hz: above the hammer's drift, below the first mode of the arm on its cells.
+/// Frequency range of the fit, Hz: above the hammer's drift, below the first mode of the arm on its
+/// cells.
 const FIT_HZ: [f64; 2] = [100.0, 600.0];
 
-/// Fits mass and parallel path to the hits on B alone; none without a whole set of them.
+/// Fits mass and parallel path to the hits on B alone; `None` without a complete set of them.
 ///
-/// Cells of other lines than the first are told in `missing`. The hits are moved to the virtual point by the impacts' transformation, so that a hit beside the contact counts with its lever.
+/// Cells whose lines differ from those of the first are reported in `missing`. The hits are
+/// transformed to the virtual point by the impacts' transformation, so that a hit away from the
+/// contact is weighted by its lever arm.
 pub fn from_hits(
     averages: &[CellAverage],
     points: &Configuration,

@@ -1,9 +1,11 @@
-//! Averaged cells into one FRF matrix per configuration, in the geometry's order.
+//! Assembles averaged cells into one FRF matrix per configuration, in the geometry's order.
 //!
-//! A substructuring matrix has no place for a guess: where a cell is missing that Eq. (3) reads, its impact or its
-//! response location is left out. A cell that Eq. (3) does not read (a spare response, a hit on B in the assembly)
-//! costs nothing: its place holds NaN, and whoever asks for it is refused by name. What is written for other programs leaves
-//! nothing out: it has a place for every pair of the geometry. Points on specimens are no points of the arms: they are in the latter alone.
+//! A substructuring matrix must not contain guesses: if a cell that Eq. (3) uses is missing, its
+//! impact or its response location is left out. A cell that Eq. (3) does not use (a spare response,
+//! a hit on B in the assembly) may be missing: its value is NaN, and selecting it is refused with
+//! its name. Matrices written for other programs leave nothing out: they have a value for every
+//! pair of the geometry. Points on specimens are not points of the arms: they are only in the
+//! latter matrices.
 
 use super::averages::CellAverage;
 use crate::frf::Frf;
@@ -13,10 +15,10 @@ use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 
-/// What came of a configuration.
+/// The FRF matrix of a configuration.
 #[derive(Debug)]
 pub struct Assembled {
-    /// H1 with its variance, if anything was measured; NaN where nothing was.
+    /// H1 with its variance, if anything was measured; NaN for cells without measurement.
     pub measured: Option<Frf>,
     /// Impacts that had to be left out because cells are missing.
     pub impacts_left_out: Vec<String>,
@@ -35,13 +37,14 @@ pub fn locations(points: &Configuration) -> Vec<&str> {
     names
 }
 
-/// Whether a response location is on an arm, not on a specimen.
+/// Whether a response location is on an arm rather than on a specimen.
 fn on_an_arm(points: &Configuration, location: &str) -> bool {
     !points.channels.iter().any(|c| c.name == location && c.grouping.is_specimen())
 }
 
-/// Whether Eq. (3), in either form, reads the cell of this impact and this response: Y^A from everything on A to A's
-/// interface, Y^B from B's interface to everything on B, and across the joint from A to B in the assembly.
+/// Whether Eq. (3), in either form, uses the cell of this impact and this response: Y^A from
+/// everything on A to A's interface, Y^B from B's interface to everything on B, and across the
+/// joint from A to B in the assembly.
 fn is_read(configuration: Structure, impact: Grouping, response: Grouping) -> bool {
     let on_a = |g| matches!(g, Grouping::InterfaceA | Grouping::InternalA);
     match configuration {
@@ -51,8 +54,8 @@ fn is_read(configuration: Structure, impact: Grouping, response: Grouping) -> bo
     }
 }
 
-/// Puts the cells of a configuration together. Where cells are missing that are read, the impact or location with the
-/// largest share of holes is left out, until none remain.
+/// Assembles the cells of a configuration. If required cells are missing, the impact or location
+/// with the largest fraction of missing cells is left out, repeatedly until none is missing.
 pub fn assemble(
     configuration: Structure,
     points: &Configuration,
@@ -91,7 +94,8 @@ pub fn assemble(
     Assembled { measured, impacts_left_out, responses_left_out }
 }
 
-/// H1 of every pair of the geometry with its variance and coherence, measured or not; none where nothing was measured.
+/// H1 of every pair of the geometry with its variance and coherence, measured or not; `None` if
+/// nothing was measured.
 pub fn everything(points: &Configuration, cells: &[CellAverage], quantity: MotionQuantity) -> Option<Frf> {
     let all = |count: usize| (0..count).collect::<Vec<_>>();
     let (channels, impacts) = (all(points.channels.len()), all(points.impacts.len()));
@@ -106,7 +110,7 @@ pub fn everything(points: &Configuration, cells: &[CellAverage], quantity: Motio
     Some(frf.with_coherence(coherence).expect("one of each was made for every value"))
 }
 
-/// What one value of a matrix is of.
+/// The cell and axis of one value of a matrix.
 struct Average<'c> {
     row: usize,
     column: usize,
@@ -114,7 +118,7 @@ struct Average<'c> {
     axis: usize,
 }
 
-/// How many hits each FRF of [`everything`] is the average of, outputs × inputs; 0 where there is none.
+/// Number of hits averaged in each FRF of [`everything`], outputs × inputs; 0 if there is none.
 pub fn hits(points: &Configuration, cells: &[CellAverage]) -> DMatrix<usize> {
     DMatrix::from_fn(points.channels.len(), points.impacts.len(), |row, column| {
         let cell = find(cells, &points.impacts[column], &points.channels[row].name);
@@ -122,7 +126,7 @@ pub fn hits(points: &Configuration, cells: &[CellAverage]) -> DMatrix<usize> {
     })
 }
 
-/// The FRFs of these channels and impacts with their noise, and what they are of.
+/// The FRFs of these channels and impacts with their noise, and the cell of each value.
 fn measured<'c>(
     points: &Configuration,
     channels: &[usize],
@@ -169,13 +173,13 @@ fn measured<'c>(
     Some((whole, averages))
 }
 
-/// Which of its location's channels this one is: records hold them in the geometry's order.
+/// Index of this channel within its location: records hold the channels in the geometry's order.
 fn component(points: &Configuration, channel: usize) -> usize {
     let name = &points.channels[channel].name;
     points.channels[..channel].iter().filter(|before| before.name == *name).count()
 }
 
-/// The same of one of its channels.
+/// The same index, from the channel itself.
 pub fn component_of(points: &Configuration, channel: &Point) -> usize {
     points.channels.iter().position(|own| own == channel).map_or(0, |place| component(points, place))
 }
@@ -185,14 +189,15 @@ fn find<'c>(cells: &'c [CellAverage], impact: &Point, location: &str) -> Option<
     cells.iter().find(|c| c.name.impact == impact.name && c.name.response == location)
 }
 
-/// Rows and columns of the largest part without holes that leaving out the worst one, again and again, finds.
+/// Rows and columns of a complete part, found by repeatedly leaving out the worst row or column.
 fn complete(rows: usize, columns: usize, there: impl Fn(usize, usize) -> bool) -> (Vec<usize>, Vec<usize>) {
     let (mut kept_rows, mut kept_columns): (Vec<usize>, Vec<usize>) =
         ((0..rows).collect(), (0..columns).collect());
     loop {
         let holes_of_row = |r: usize| kept_columns.iter().filter(|c| !there(r, **c)).count();
         let holes_of_column = |c: usize| kept_rows.iter().filter(|r| !there(**r, c)).count();
-        // shares, so that a whole missing row goes before a column that it crosses
+        // fractions rather than counts, so that a row that is missing as a whole goes before a
+        // column that it crosses
         let worst_row = kept_rows
             .iter()
             .map(|r| (holes_of_row(*r) as f64 / kept_columns.len().max(1) as f64, *r))
@@ -237,7 +242,7 @@ mod tests {
     fn holes_are_cut_out_with_little_loss() {
         // one cell of row 2 is missing: the row is the smaller loss
         assert_eq!(complete(4, 3, |r, c| (r, c) != (2, 1)), (vec![0, 1, 3], vec![0, 1, 2]));
-        // an interrupted campaign: row 3 has not begun, row 2 is half done
+        // an interrupted campaign: row 3 has not begun, row 2 is half complete
         let (rows, columns) = complete(4, 4, |r, c| r < 2 || (r == 2 && c < 2));
         assert_eq!((rows, columns), (vec![0, 1], vec![0, 1, 2, 3]));
         assert_eq!(complete(2, 2, |_, _| false), (vec![], vec![]));

@@ -1,49 +1,52 @@
-//! From kept hits to spectra, one cell at a time; a hit's time signals are gone when it is in the sums.
+//! From kept hits to spectra, one cell at a time; a hit's time signals are not kept once it has
+//! been added.
 
 use super::cell::{CellName, ContactDelays, Hit};
 use crate::contact::{BAND, LEVEL_LINES, SIGMA_PER_S};
 use crate::spectra::{CrossSpectra, Pulse, SpectraError, Summing, Windowing};
 
-/// The lines that are used, Hz: those below carry rigid-body drift and the mains' subharmonics, not the joint; those above are in
-/// no band.
+/// The lines used, Hz: lower ones contain rigid-body drift and subharmonics of the mains rather
+/// than the joint; higher ones are in no band.
 pub const LINES_HZ: [f64; 2] = [10.0, 1000.0];
 
-/// Lines in one value of a cell's force spectrum.
+/// Number of lines averaged in one value of a cell's force spectrum.
 pub const FORCE_LINES: usize = 16;
 
 /// Spectra of one cell on s = σ + iω, as measured (not yet receptances).
 #[derive(Debug, Clone)]
 pub struct CellAverage {
-    /// Which cell.
+    /// The cell.
     pub name: CellName,
     /// The records averaged.
     pub records: Vec<i64>,
-    /// The response, along each of its channels.
+    /// The response, for each of its channels.
     pub spectra: CrossSpectra,
-    /// Auto-spectrum of the force up to half the sampling rate, N² s²: means of [`FORCE_LINES`] lines each. All lines of all cells
-    /// would be most of what an analysis remembers.
+    /// Auto-spectrum of the force up to half the sampling rate, N² s²: means of [`FORCE_LINES`]
+    /// lines each. Storing all lines of all cells would dominate the memory of an analysis.
     pub force_spectrum: Vec<f64>,
-    /// Distance of lines, Hz.
+    /// Spacing of the lines, Hz.
     pub step_hz: f64,
-    /// v_A, v_B and T at the contact, where asked for and measured.
+    /// v_A, v_B and T at the contact, if requested and measured.
     pub contact: Option<CrossSpectra>,
-    /// The response, v_A, v_B and T with the heavy damping that the contact is read with, where asked for and measured.
+    /// The response, v_A, v_B and T with the heavy damping used for the contact, if requested and
+    /// measured.
     pub damped: Option<CrossSpectra>,
-    /// As `damped` with the plan's light damping: what the shaker's levels are corrected by.
+    /// As `damped` but with the plan's light damping, used to correct the shaker's levels.
     pub light: Option<CrossSpectra>,
 }
 
-/// What of a cell is wanted beside its FRFs.
+/// Results of a cell requested in addition to its FRFs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Asked {
     /// The spectra at the contact.
     pub contact: bool,
-    /// The same, and the response, as the contact's own stiffness is read from.
+    /// The spectra at the contact and of the response, from which the contact stiffness is
+    /// identified.
     pub damped: bool,
 }
 
-/// The sums over a cell's hits, which come one at a time. Hits of sessions with other delays are summed apart, and brought in step
-/// with the force before the sums are added.
+/// Sums over a cell's hits, which are added one at a time. Hits of sessions with different delays
+/// are summed separately, and corrected for their delays before the sums are added.
 pub struct CellSums {
     name: CellName,
     sigma_per_s: f64,
@@ -51,13 +54,13 @@ pub struct CellSums {
     lines_hz: [f64; 2],
     records: Vec<i64>,
     groups: Vec<Group>,
-    /// Channels of the response location.
+    /// Number of channels of the response location.
     axes: usize,
     /// Whether every hit had the signals at the contact.
     at_contact: bool,
 }
 
-/// The hits that are late by the same times.
+/// Hits with the same delays.
 struct Group {
     delay_s: Vec<f64>,
     light: Summing,
@@ -65,7 +68,7 @@ struct Group {
 }
 
 impl CellSums {
-    /// Of a cell without hits.
+    /// A cell without hits.
     pub fn new(name: CellName, sigma_per_s: f64, asked: Asked, lines_hz: [f64; 2]) -> Self {
         CellSums {
             name,
@@ -79,15 +82,15 @@ impl CellSums {
         }
     }
 
-    /// Adds a hit that was sampled at `fs_hz`.
+    /// Adds a hit sampled at `fs_hz`.
     ///
     /// # Errors
-    /// A hit that does not fit the others, or holds no pulse.
+    /// A hit that does not match the others, or has no pulse.
     pub fn add(&mut self, hit: &Hit, fs_hz: f64) -> Result<(), SpectraError> {
         if self.records.is_empty() {
             self.axes = hit.response.len();
             if hit.contact.is_none() {
-                // what one hit lacks is told of none
+                // omitted if any hit lacks it
                 self.asked = Asked::default();
             }
         }
@@ -107,7 +110,7 @@ impl CellSums {
                     &contact.tangential_n,
                 ]);
             } else {
-                // what one hit lacks is told of none
+                // omitted if any hit lacks it
                 self.at_contact = false;
                 delay_s.extend([0.0; 3]);
                 outputs.extend([&nothing[..]; 3]);
@@ -138,10 +141,10 @@ impl CellSums {
         Ok(())
     }
 
-    /// What the hits give together.
+    /// The average of all hits.
     ///
     /// # Errors
-    /// No hit, or hits that do not fit together.
+    /// No hit, or hits that do not match.
     pub fn finish(self) -> Result<CellAverage, SpectraError> {
         let all = self.together(|group| Some(group.light.finish(&group.delay_s)))?;
         let all = all.ok_or(SpectraError::NoHits)?;
@@ -174,7 +177,7 @@ impl CellSums {
         self.asked.contact || self.asked.damped
     }
 
-    /// The lines that the light window's sums must hold.
+    /// The lines for which the sums with the light window are needed.
     fn summed_lines_hz(&self) -> [f64; 2] {
         let [low_hz, high_hz] = self.lines_hz;
         if self.asked.damped {
@@ -184,7 +187,7 @@ impl CellSums {
         }
     }
 
-    /// A part of every group, added.
+    /// One part of every group, added up.
     fn together(
         &self,
         part: impl Fn(&Group) -> Option<Result<CrossSpectra, SpectraError>>,

@@ -1,4 +1,4 @@
-//! The stages of a campaign's analysis, one after the other.
+//! The stages of a campaign's analysis, in order.
 
 use super::assemble::everything;
 use super::averages::{CellAverage, LINES_HZ};
@@ -20,7 +20,7 @@ use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify, keep_common_lines};
 use std::collections::HashSet;
 
-/// Everything that the measurements say; of what they were measured with, nothing.
+/// Analyses the measurements. The caller adds the provenance and the equipment used.
 pub fn analyse_measurements<M: Measurements>(
     measurements: &M,
     wanted: Wanted,
@@ -69,7 +69,7 @@ pub fn analyse_measurements<M: Measurements>(
         }
         Err(why) => found.missing.push(why),
     }
-    // a plan without A's interface asks for nothing between the arms
+    // a plan without A's interface does not measure the stiffness between the arms
     let asks = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::InterfaceA);
     if let Some(ajb) = frfs[2].filter(|_| asks) {
         let priors = measurements.contact_priors().positions;
@@ -85,7 +85,7 @@ pub fn analyse_measurements<M: Measurements>(
             fit::Options { priors: measurements.contact_priors().positions, ..fit::Options::default() };
         fit_of_the_main_band([a, b, ajb], geometry, &options)
     };
-    // where one waits for a core the other does not
+    // run in parallel: each uses cores that the other leaves idle
     let (fits, own) = rayon::join(fit, || contact_answer::answer(measurements, &cells.averages));
     found.fits = fits;
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
@@ -99,8 +99,9 @@ pub fn analyse_measurements<M: Measurements>(
     found
 }
 
-/// Takes from the averages the FRFs that are in the matrices now: they would be held beside them to the end. Those of the impacts that the
-/// contact is seen from are shown with it.
+/// Removes the FRFs that are now in the matrices from the averages; otherwise both copies would be
+/// kept to the end. FRFs of impacts that are also used for the contact are kept, because they are
+/// shown with it.
 fn forget_frfs(averages: &mut [CellAverage]) {
     let of_assembly = |average: &CellAverage| average.name.configuration == Structure::Ajb;
     let seen = averages.iter().filter(|average| of_assembly(average) && average.contact.is_some());
@@ -112,7 +113,7 @@ fn forget_frfs(averages: &mut [CellAverage]) {
     }
 }
 
-/// The averages of one configuration, of all that are sorted by it.
+/// The averages of one configuration, from all averages sorted by configuration.
 fn of_configuration(sorted: &[CellAverage], structure: Structure) -> &[CellAverage] {
     sorted
         .chunk_by(|a, b| a.name.configuration == b.name.configuration)
@@ -120,8 +121,8 @@ fn of_configuration(sorted: &[CellAverage], structure: Structure) -> &[CellAvera
         .unwrap_or_default()
 }
 
-/// Copies of all three with the lines that they have in common; none where one is missing, their lines
-/// are the same, or there is no common grid, which [`identify`] then says.
+/// Copies of all three restricted to their common lines; `None` if one is missing, if their lines
+/// are equal, or if there is no common grid, which [`identify`] then reports.
 fn on_common_lines(frfs: [Option<&Frf>; 3], missing: &mut Vec<Missing>) -> Option<[Frf; 3]> {
     let [Some(a), Some(b), Some(ajb)] = frfs else { return None };
     if b.frequency_hz() == a.frequency_hz() && ajb.frequency_hz() == a.frequency_hz() {
@@ -141,7 +142,8 @@ fn substructured(frfs: [&Frf; 3], geometry: &Geometry) -> Result<Substructured, 
     let mut found = identified
         .map(|found| Substructured::of(frfs, geometry, &Priors::default(), found))
         .map_err(Missing::Substructuring)?;
-    // of the paper's methods the results keep the spectra too; A.1 the other way round is the same but for rounding
+    // of the paper's methods the results include the spectra; the second form of A.1 is omitted
+    // because it differs only by rounding
     let kept = |name: &str| Method::PAPER.iter().any(|m| *m != Method::InverseBa && m.name() == name);
     found.spectra.retain(|(spectrum, _)| kept(&spectrum.method));
     Ok(found)
@@ -156,7 +158,7 @@ fn fit_of_the_main_band(frfs: [&Frf; 3], geometry: &Geometry, options: &fit::Opt
     fits(frfs, geometry, &[idms], &[MAIN_BAND], options)
 }
 
-/// Which estimate of the main band is the stiffness between the arms.
+/// Decides which estimate of the main band is the stiffness between the arms.
 fn decided(found: &Findings) -> Result<BetweenArms, NoStiffness> {
     let fitted = found.fits.first().and_then(|fit| match &fit.outcome {
         Ok(fitted) => Some(Ok(fitted)),

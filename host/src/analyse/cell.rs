@@ -1,4 +1,5 @@
-//! What the analysis asks of a campaign: its geometry, its cells, and the kept hits of one cell in SI units.
+//! Data that the analysis needs from a campaign: its geometry, its cells, and the kept hits of one
+//! cell in SI units.
 
 use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;
@@ -19,18 +20,18 @@ pub struct CellName {
     pub response: String,
 }
 
-/// The kept hits of a cell. Signals are as they were recorded: delays are told, not corrected.
+/// The kept hits of a cell. Signals are as recorded: delays are stated, not corrected.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cell {
     /// Sampling rate, Hz.
     pub fs_hz: f64,
     /// Kept hits.
     pub hits: Vec<Hit>,
-    /// What is said about records that were kept and cannot be used.
+    /// Messages about kept records that cannot be used.
     pub left_out: Vec<String>,
 }
 
-/// How late the signals at the contact are against the hammer's force, s.
+/// Delays of the signals at the contact relative to the hammer's force, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ContactDelays {
     /// Vibrometer on specimen A.
@@ -46,15 +47,16 @@ pub struct ContactDelays {
 pub struct Hit {
     /// The record's id in the campaign file.
     pub record: i64,
-    /// Whether it was struck for another cell, whose row it fills.
+    /// Whether it was struck for another cell, whose hits also fill this cell.
     pub of_row: bool,
     /// Hammer force, N.
     pub force_n: Vec<f64>,
-    /// The channels at the response location, SI: the scanning vibrometer's x, y and z, or as the plan's axes say.
+    /// The channels at the response location, SI: the scanning vibrometer's x, y and z, or the
+    /// plan's axes.
     pub response: Vec<Vec<f64>>,
-    /// How late these are against the hammer's force, s.
+    /// Their delays relative to the hammer's force, s.
     pub response_delay_s: Vec<f64>,
-    /// The signals at the contact, where the rig has them.
+    /// The signals at the contact, if the rig has them.
     pub contact: Option<ContactSignals>,
 }
 
@@ -67,7 +69,7 @@ pub struct ContactSignals {
     pub specimen_b_m_per_s: Vec<f64>,
     /// Sum of the load cells, N.
     pub tangential_n: Vec<f64>,
-    /// How late they are against the hammer's force.
+    /// Their delays relative to the hammer's force.
     pub delay_s: ContactDelays,
 }
 
@@ -78,41 +80,42 @@ pub struct ShakerLevel {
     pub id: i64,
     /// Before or after the hammer's cells.
     pub moment: Moment,
-    /// What was ordered.
+    /// Nominal excitation.
     pub level: Level,
-    /// The signals at the contact, in step.
+    /// The signals at the contact, aligned in time.
     pub record: HysteresisRecord,
 }
 
-/// What is known of contact and static arm beforehand.
+/// Prior knowledge of contact and static arm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct KnownContact {
     /// The normal load, N.
     pub normal_load_n: Option<f64>,
-    /// Stiffness to ground beside the load cells, over theirs.
+    /// Stiffness to ground parallel to the load cells, relative to theirs.
     pub parallel_path: Option<f64>,
     /// Effective mass of the static arm at the contact, kg.
     pub effective_mass_kg: Option<f64>,
 }
 
-/// A campaign as the analysis sees it. Cells are read one at a time, from several threads.
+/// Interface through which the analysis accesses a campaign. Cells are read one at a time, from
+/// several threads.
 pub trait Measurements: Sync {
     /// Why a cell cannot be read.
     type Error: std::error::Error + Send + Sync + 'static;
 
-    /// Where everything is.
+    /// Positions and directions of all points.
     fn geometry(&self) -> &Geometry;
 
-    /// Damping of the exponential window that the plan asks for, 1/s.
+    /// Damping of the exponential window according to the plan, 1/s.
     fn sigma_per_s(&self) -> f64;
 
-    /// What the scanning vibrometer measures.
+    /// Quantity measured by the scanning vibrometer.
     fn quantity(&self) -> MotionQuantity;
 
     /// The plan's cells.
     fn cells(&self) -> Vec<CellName>;
 
-    /// Cells that were given up, with the reason.
+    /// Cells that were abandoned, with the reason.
     fn given_up(&self) -> Vec<(CellName, String)> {
         Vec::new()
     }
@@ -125,37 +128,42 @@ pub trait Measurements: Sync {
         Ok(None)
     }
 
-    /// The shaker's levels, and complaints about those that cannot be used.
+    /// The shaker's levels, and messages about those that cannot be used.
     fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {
         (Vec::new(), Vec::new())
     }
 
-    /// What is known of contact and static arm beforehand.
+    /// Prior knowledge of contact and static arm.
     fn known_contact(&self) -> KnownContact {
         KnownContact::default()
     }
 
-    /// Where the vibrometers beside the contact look, on A and on B, m; none where nobody says.
+    /// Positions measured by the vibrometers near the contact, on A and on B, m; `None` if not
+    /// stated.
     fn spots_m(&self) -> Option<[[f64; 3]; 2]> {
         None
     }
 
-    /// What is known beforehand of positions, angles, gains and delays.
+    /// Prior knowledge of positions, angles, gains and delays.
     fn contact_priors(&self) -> ContactPriors {
         ContactPriors::default()
     }
 
-    /// How well the place of this response point is known, standard deviation along each axis, m; none where the priors of its kind hold.
+    /// Standard deviation of this response point's position along each axis, m; `None` if the
+    /// priors of its kind apply.
     fn point_sigma_m(&self, _point: &str) -> Option<f64> {
         None
     }
 
-    /// Shows `look` the kept hits of a cell, one at a time, with their sampling rate, Hz; none if it was not measured. Its own come before
-    /// those of the cell whose hits fill it. The signals at the contact may be left out where `contact` does not ask for them.
-    /// A hit is lent: the next one may take its memory. Returns what is said about records that were kept and cannot be used.
+    /// Calls `look` with the kept hits of a cell, one at a time, and with their sampling rate, Hz;
+    /// never if the cell was not measured. Its own hits come before those of the cell whose hits
+    /// fill it. The signals at the contact may be omitted if `contact` is false. The hit is
+    /// borrowed, and its buffers may be reused for the next one. Returns messages about kept
+    /// records that cannot be used.
     ///
     /// # Errors
-    /// The file cannot be read, or the hits differ in rate. Some of them may have been shown then.
+    /// The file cannot be read, or the hits differ in rate. `look` may have been called for some of
+    /// them by then.
     fn each_hit(
         &self,
         cell: &CellName,
@@ -163,10 +171,10 @@ pub trait Measurements: Sync {
         look: &mut dyn FnMut(&Hit, f64),
     ) -> Result<Vec<String>, Self::Error>;
 
-    /// All kept hits of a cell, as [`Measurements::each_hit`] shows them.
+    /// All kept hits of a cell, from [`Measurements::each_hit`].
     ///
     /// # Errors
-    /// As of `each_hit`.
+    /// As for `each_hit`.
     fn read(&self, cell: &CellName, contact: bool) -> Result<Cell, Self::Error> {
         let mut whole = Cell::default();
         let left_out = self.each_hit(cell, contact, &mut |hit, fs_hz| {

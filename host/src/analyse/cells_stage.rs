@@ -1,4 +1,4 @@
-//! The cells, one at a time on each thread: read, averaged, and their signals forgotten.
+//! Reads and averages the cells, one at a time on each thread, without keeping their signals.
 
 use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
 use super::cell::{Cell, CellName, Measurements};
@@ -14,22 +14,22 @@ use crate::substructuring::geometry::{Geometry, Grouping};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What came of the cells, in their order.
+/// Results of the cells, in their order.
 #[derive(Debug, Default)]
 pub struct Cells {
-    /// FRFs of those that have a kept hit.
+    /// FRFs of the cells that have a kept hit.
     pub averages: Vec<CellAverage>,
-    /// Spectra of single hits, where they were asked for.
+    /// Spectra of single hits, if requested.
     pub hits: Vec<CellHits>,
     /// The loops of the hits that move the contact.
     pub loops: Vec<ImpactLoop>,
-    /// What each of these gives per newton, cell by cell.
+    /// The response of each of these hits per newton, cell by cell.
     pub at_contact: Vec<HitAtContact>,
-    /// What could not be used.
+    /// Data that could not be used.
     pub missing: Vec<Missing>,
 }
 
-/// Reads and averages all of `names`; `keep_hits` asks for the spectra of single hits.
+/// Reads and averages all of `names`; with `keep_hits`, also returns the spectra of single hits.
 pub fn read_all<M: Measurements>(
     measurements: &M,
     names: &[CellName],
@@ -66,7 +66,8 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     let mut sums: Option<CellSums> = None;
     let (mut unfit, mut kept) = (None, Cell::default());
     let read = measurements.each_hit(name, moves_contact || drives || damped, &mut |hit, fs_hz| {
-        // what the contact did under a hit is told by the cell that was struck, once; its own hits come first
+        // the contact signals of a hit count once, in the cell that was struck; a cell's own hits
+        // come first
         let sums = sums.get_or_insert_with(|| {
             let asked = Asked { contact: !hit.of_row && (moves_contact || drives), damped };
             CellSums::new(name.clone(), sigma_per_s, asked, LINES_HZ)
@@ -107,8 +108,8 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     found
 }
 
-/// Whether hits at this impact move the contact along z from A's side: hits on B drive the load cells directly, and hits
-/// along x move nothing in z.
+/// Whether hits at this impact move the contact along z from A's side: hits on B drive the load
+/// cells directly, and hits along x cause no motion in z.
 fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
     name.configuration == Structure::Ajb
         && geometry.ajb.impacts.iter().any(|p| {
@@ -118,7 +119,8 @@ fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
         })
 }
 
-/// Whether hits at this impact drive the load cells through arm B alone: what the static arm is identified from.
+/// Whether hits at this impact drive the load cells only through arm B, so that the static arm can
+/// be identified from them.
 fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
     name.configuration == Structure::B
         && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)

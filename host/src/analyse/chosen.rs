@@ -1,4 +1,4 @@
-//! Which FRFs the report shows: a driving point and a transfer of every configuration.
+//! Selects the FRFs shown in the report: a driving point and a transfer FRF of every configuration.
 
 use super::assemble::component_of;
 use super::averages::CellAverage;
@@ -15,7 +15,7 @@ fn find<'c>(cells: &'c [CellAverage], impact: &Point, channel: &Point) -> Option
     cells.iter().find(named).filter(|c| c.spectra.outputs() > 0)
 }
 
-/// The curves of a configuration that was measured here.
+/// The curves of a configuration that was measured in this campaign.
 pub fn of_cells(
     configuration: Structure,
     points: &Configuration,
@@ -29,7 +29,7 @@ pub fn of_cells(
     chosen.into_iter().filter_map(curve).collect()
 }
 
-/// The driving point against its own noise.
+/// The driving point compared with its own noise.
 pub fn noise_floor(
     configuration: Structure,
     points: &Configuration,
@@ -72,7 +72,7 @@ fn of_cell(
     let order = quantity.order_of_s();
     let y = &cell.spectra;
     let axis = component_of(points, pair.2).min(y.outputs().saturating_sub(1));
-    // the channel counts along its own direction
+    // responses are positive along the channel's own direction
     let sign = pair.2.direction[2].signum();
     let receptance = (0..y.lines()).map(|line| y.h1(line, axis) * y.s(line).powi(-order) * sign);
     let several = cell.records.len() > 1;
@@ -84,7 +84,7 @@ fn of_cell(
     }
 }
 
-/// The curves of FRFs that were measured elsewhere; none where their lines are not evenly spaced.
+/// The curves of imported FRFs; empty if their lines are not evenly spaced.
 pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &Frf) -> Vec<FrfCurve> {
     let place = |names: &[String], name: &str| names.iter().position(|n| n == name);
     let (outputs, inputs) = (points.output_names(), points.input_names());
@@ -95,13 +95,13 @@ pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &Frf) ->
     };
     let steps = || frf.frequency_hz().windows(2).map(|pair| pair[1] - pair[0]);
     let first = steps().next().unwrap_or(0.0);
-    // files keep their axis to six digits or so
+    // files give the axis with about six digits
     let even = steps().all(|step| (step - first).abs() <= 1e-3 * first);
     let (true, Ok(y)) = (even, frf.to_receptance()) else { return Vec::new() };
     let chosen = choose(points, &|impact, channel| find(impact, channel).is_some());
     let curve = |(role, impact, channel): (Role, &Point, &Point)| {
         let place = find(impact, channel)?;
-        // the channel counts along its own direction
+        // responses are positive along the channel's own direction
         let sign = channel.direction[2].signum();
         let values = y.lines().iter().map(|y| y[place] * sign);
         Some(curve(configuration, (role, impact, channel), y.frequency_hz(), values))
@@ -109,13 +109,14 @@ pub fn of_matrix(configuration: Structure, points: &Configuration, frf: &Frf) ->
     chosen.into_iter().filter_map(curve).collect()
 }
 
-/// Driving point: the response along z nearest to an impact along z. Transfer: the same impact, across the joint in
-/// the assembly, at the far end otherwise. `measured` tells which pairs of impact and channel there are.
+/// Driving point: the response along z nearest to an impact along z. Transfer: the same impact,
+/// with the response across the joint in the assembly, otherwise at the far end. `measured` returns
+/// whether a pair of impact and channel exists.
 fn choose<'p>(
     points: &'p Configuration,
     measured: &dyn Fn(&Point, &Point) -> bool,
 ) -> Vec<(Role, &'p Point, &'p Point)> {
-    // a specimen's motion is the contact's matter
+    // the specimens' motion is shown with the contact
     let along_z = |p: &&Point| p.direction[2].abs() > 0.9 && !p.grouping.is_specimen();
     let mut pairs: Vec<(&Point, &Point, f64)> = Vec::new();
     for impact in points.impacts.iter().filter(along_z) {
@@ -127,7 +128,7 @@ fn choose<'p>(
     let driving = pairs
         .iter()
         .filter(|(i, c, _)| same_side(i, c))
-        // in the assembly the joint is excited from A
+        // in the assembly an impact on A is preferred
         .min_by(|x, y| {
             (!on_a(x.0.grouping), x.2)
                 .partial_cmp(&(!on_a(y.0.grouping), y.2))
@@ -143,7 +144,8 @@ fn choose<'p>(
         .collect()
 }
 
-/// A point of each arm along z from `impact`, in the assembly: what the specimens are compared with.
+/// One point of each arm along z, excited at `impact` in the assembly, for comparison with the
+/// specimens.
 pub fn arms(
     impact: &str,
     points: &Configuration,
@@ -163,7 +165,8 @@ pub fn arms(
     both.into_iter().flatten().collect()
 }
 
-/// Receptance along the two directions, hit and response both counted positive along z: a driving point starts at 0°.
+/// Receptance along the two directions, with hit and response both positive along z: a driving
+/// point starts at 0°.
 fn curve(
     configuration: Structure,
     (role, impact, channel): (Role, &Point, &Point),

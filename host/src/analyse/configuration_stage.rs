@@ -1,4 +1,5 @@
-//! The averaged cells of one configuration as an FRF matrix with its noise; or FRFs from elsewhere in their place.
+//! Assembles the averaged cells of one configuration to an FRF matrix with its noise, or uses
+//! imported FRFs instead.
 
 use super::averages::{CellAverage, FORCE_LINES};
 use super::cell::Measurements;
@@ -11,18 +12,18 @@ use crate::structure::Structure;
 use crate::substructuring::Frf;
 use crate::substructuring::geometry::Configuration;
 
-/// What came of a configuration.
+/// Results for one configuration.
 #[derive(Debug)]
 pub struct ConfigurationFrfs {
-    /// What the results tell of it.
+    /// The part for the findings.
     pub measured: ConfigurationFindings,
-    /// Its FRFs; none where nothing was measured.
+    /// Its FRFs; `None` if nothing was measured.
     pub frf: Option<Frf>,
-    /// What had to be done without.
+    /// Missing data.
     pub missing: Vec<Missing>,
 }
 
-/// Puts the configuration together from its averaged cells, `own`, of which `planned` are in the plan.
+/// Assembles the configuration from its averaged cells, `own`; the plan has `planned` cells.
 pub fn of<M: Measurements>(
     measurements: &M,
     configuration: Structure,
@@ -87,7 +88,7 @@ fn holes(configuration: Structure, planned: usize, own: &[CellAverage]) -> Vec<M
     hole.into_iter().chain(single).collect()
 }
 
-/// Where the mean force of a configuration's hits is within 6 dB of its level.
+/// Band in which the mean force of a configuration's hits is within 6 dB of its level.
 fn force_band(configuration: Structure, own: &[CellAverage]) -> Option<UsableBand> {
     let first = own.first()?;
     let alike = || own.iter().filter(|c| c.force_spectrum.len() == first.force_spectrum.len());

@@ -1,4 +1,4 @@
-//! The contact's own stiffness: which cells tell it, and what they say together.
+//! The contact stiffness: selects the cells used, and evaluates them together.
 
 use super::averages::CellAverage;
 use super::cell::{CellName, Measurements};
@@ -7,8 +7,9 @@ use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
 
-/// Whether a cell serves the estimate of the contact: arm B's interface from hits on B alone, and from the assembly arm B's interface and the
-/// specimens from hits along z on A or on what stands behind it.
+/// Whether a cell is used for the estimate of the contact: arm B's interface from hits on B alone,
+/// and from the assembly arm B's interface and the specimens from hits along z on A or on the part
+/// behind it.
 pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
     let specimen = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::SpecimenA);
     if !specimen || name.configuration == Structure::A {
@@ -16,7 +17,8 @@ pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
     }
     let points = geometry.points(name.configuration);
     let mut own = points.channels.iter().filter(|p| p.name == name.response);
-    // the contact's own signals and the lasers are along z, and the estimator takes the motion along x, y and z
+    // the contact's signals and the vibrometers on the specimens are along z, and the estimator
+    // needs the motion along x, y and z
     let usual = own.clone().map(|p| p.direction).eq([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     let served = usual && own.any(|p| contact::serves(p.grouping));
     let hit = points.impacts.iter().find(|p| p.name == name.impact);
@@ -29,10 +31,10 @@ pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
         })
 }
 
-/// Reads the contact from the averaged cells.
+/// Identifies the contact from the averaged cells.
 ///
 /// # Errors
-/// Why there is no answer, and what would change that.
+/// Why there is no result, and how to obtain one.
 pub fn answer<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
@@ -74,10 +76,10 @@ pub fn cells<'a, M: Measurements>(
     averages.iter().filter_map(cell).collect()
 }
 
-/// What the contact is read from.
+/// Input of the contact identification.
 ///
 /// # Errors
-/// The plan does not say where the spots are.
+/// The plan does not state the vibrometers' points near the contact.
 pub fn input<'a, M: Measurements>(
     measurements: &M,
     cells: Vec<ContactCell<'a>>,

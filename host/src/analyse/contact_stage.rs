@@ -1,4 +1,5 @@
-//! Everything that is read at the specimens themselves: the impacts' loops, the shaker's levels, the contact in frequency.
+//! Evaluates all measurements at the specimens: the impacts' loops, the shaker's levels, and the
+//! contact in the frequency domain.
 
 use super::averages::CellAverage;
 use super::cell::Measurements;
@@ -21,43 +22,44 @@ use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
 use crate::substructuring::geometry::{Geometry, Grouping};
 
-/// Groups of hits by which a resonance is told from noise.
+/// Number of groups of hits used to distinguish a resonance from noise.
 const GROUPS: usize = 4;
 
-/// What the contact's own signals say.
+/// Results from the contact's signals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
     /// FRFs of the specimens, and of both arms from the same impact.
     pub frfs: Vec<FrfCurve>,
-    /// T/Δx in frequency.
+    /// T/Δx in the frequency domain.
     pub direct: Option<Direct>,
-    /// Whether a resonance of one specimen is in Δx.
+    /// Whether Δx contains a resonance of one specimen.
     pub hidden: HiddenResonance,
-    /// What the corrected force is corrected by.
+    /// Parameters of the force correction.
     pub arm: Option<Identified>,
     /// Whether the contact slips under the hammer.
     pub slip: HammerSlip,
     /// The loops of the impacts.
     pub impacts: Option<ImpactLoops>,
-    /// The middle one of them.
+    /// The one with the median slope.
     pub example_loop: Option<LoopCurve>,
-    /// Its decay, put together from two sinusoids.
+    /// Its decay, reconstructed from two sinusoids.
     pub reconstruction: Option<Reconstruction>,
     /// The loops of the shaker's levels.
     pub levels: Vec<RecordLoops>,
-    /// k_T of the hits and the levels together; none where the levels add nothing.
+    /// k_T of the hits and the levels combined; `None` if the levels add nothing.
     pub joint: Option<Joint>,
-    /// A loop of the shaker at each frequency.
+    /// One loop of the shaker at each frequency.
     pub shaker_loops: Vec<ShakerLoop>,
-    /// How a slipping contact goes with amplitude.
+    /// Dependence of a slipping contact on amplitude.
     pub backbones: Vec<Backbone>,
-    /// FBS against the specimens.
+    /// Comparison of FBS with the specimens.
     pub series: SeriesCompliance,
-    /// The levels before and after the hammer's cells.
+    /// Comparison of the levels before and after the hammer's cells.
     pub change: Option<ContactChange>,
 }
 
-/// Reads it. `between_the_arms` is what FBS found there, `own` what the hits say of the contact's own stiffness.
+/// Runs this stage. `between_the_arms` is the stiffness from FBS, `own` the contact stiffness from
+/// the hits.
 pub fn at_the_contact<M: Measurements>(
     measurements: &M,
     cells: &Cells,
@@ -120,7 +122,8 @@ pub fn at_the_contact<M: Measurements>(
     (found, missing)
 }
 
-/// The contact's spectra of the assembly, summed over the cells of each impact; cells of other lines than the first are told in `missing`.
+/// The contact's spectra of the assembly, summed over the cells of each impact; cells whose lines
+/// differ from those of the first are reported in `missing`.
 fn summed<'a>(
     averages: impl IntoIterator<Item = &'a CellAverage>,
     missing: &mut Vec<Missing>,
@@ -145,8 +148,9 @@ fn summed<'a>(
     by_impact
 }
 
-/// Δx/T of groups of cells that have no hit in common: each impact's cells are dealt out in turn. With few cells each is a group of its own,
-/// and what differs between the impacts counts as noise.
+/// Δx/T of groups of cells that share no hits: the cells of each impact are distributed over the
+/// groups in rotation. If an impact has too few cells, each cell forms a separate group, and
+/// differences between impacts count as noise.
 fn in_groups(averages: &[CellAverage]) -> Vec<ContactCompliance> {
     let cells = || averages.iter().filter(|c| c.contact.is_some() && c.name.configuration == Structure::Ajb);
     let mut dealt: Vec<Vec<&CellAverage>> = vec![Vec::new(); GROUPS];
@@ -164,15 +168,15 @@ fn in_groups(averages: &[CellAverage]) -> Vec<ContactCompliance> {
         dealt = cells().map(|cell| vec![cell]).collect();
     }
     let of = |cells: &Vec<&CellAverage>| {
-        // what is left out is told where all cells are summed
+        // cells left out are already reported by the sum over all cells
         let sums = summed(cells.iter().copied(), &mut Vec::new());
         ContactCompliance::of_impacts(&sums.iter().map(|(_, sum)| sum).collect::<Vec<_>>())
     };
     dealt.iter().filter_map(of).collect()
 }
 
-/// The impact that the specimens are shown from, with the sign of its direction along z: the moving mass drives the contact as the
-/// shaker does; any other impact will do.
+/// The impact for which the specimens are shown, with the sign of its direction along z: preferably
+/// one on the moving mass, which drives the contact as the shaker does; otherwise any impact.
 fn shown_impact<'a>(
     geometry: &Geometry,
     by_impact: &'a [(&'a str, CrossSpectra)],
@@ -183,7 +187,8 @@ fn shown_impact<'a>(
     Some((name, point(name).map_or(1.0, |p| p.direction[2].signum()), sum))
 }
 
-/// What the force is corrected by, if the levels are not needed to tell it: stated, or from hits on B alone.
+/// The parameters of the force correction if they do not depend on the levels: stated, or from hits
+/// on B alone.
 fn known_arm<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
@@ -199,7 +204,7 @@ fn known_arm<M: Measurements>(
     arm_from_hits::from_hits(averages, points, at, sigma_per_s, known.parallel_path, missing)
 }
 
-/// The signals of the hit whose slope is the middle of all, read once more.
+/// Reads the signals of the hit with the median slope once more.
 fn example<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],

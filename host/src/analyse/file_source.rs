@@ -1,4 +1,4 @@
-//! What a campaign file says of itself: where it comes from, and how much of its plan was measured.
+//! Information in a campaign file about itself: provenance, and how much of the plan was measured.
 
 use super::analyse_error::AnalyseError;
 use super::from_store::CampaignFile;
@@ -9,7 +9,7 @@ use crate::results::{Calibrated, CellRow, Cells, Completeness, HitRow, Source, r
 use crate::structure::Structure;
 
 impl CampaignFile {
-    /// Where the findings come from: file, device, settings, link.
+    /// Provenance of the findings: file, device, settings, link.
     pub(super) fn source(&self, store: &Store) -> Result<Source, AnalyseError> {
         let file = self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned();
         let mut source = Source { file, kind: "campaign".into(), ..Source::default() };
@@ -45,7 +45,7 @@ impl CampaignFile {
         if !self.plan.slides_along_z() {
             source.settings.insert("sliding_direction".into(), serde_json::json!(self.plan.sliding()));
         }
-        // which simulated rig it was, and what it was seeded with
+        // which simulated rig it was, and its random seed
         if let Some(rig) = store.simulated_rig()? {
             source.settings.insert("rig".into(), rig.name.into());
             source.settings.insert("seed".into(), rig.seed.to_string().into());
@@ -59,7 +59,7 @@ impl CampaignFile {
         Ok(source)
     }
 
-    /// Every cell of the plan, in its order, with how it was heard.
+    /// Every cell of the plan, in order, with its data quality.
     pub(super) fn cell_rows(&self, heard: &Heard) -> Cells {
         let rows = self.cells.iter().map(|cell| {
             let count = self.tally.cell(cell.id);
@@ -83,7 +83,7 @@ impl CampaignFile {
         Cells { cells: rows.collect(), frequency_hz: heard.frequency_hz.clone() }
     }
 
-    /// Every firing of the hammer that left a readable record, in order.
+    /// Every firing of the hammer with a readable record, in order.
     pub(super) fn hit_rows(&self) -> Vec<HitRow> {
         let mut rows: Vec<HitRow> = (self.records.values().flatten().flatten())
             .map(|r| HitRow {
@@ -121,7 +121,7 @@ impl CampaignFile {
     }
 }
 
-/// Least, mean and largest temperature, °C; none where none was measured.
+/// Minimum, mean and maximum temperature, °C; `None` without measurements.
 fn temperature_c(store: &Store) -> Result<Option<[f64; 3]>, AnalyseError> {
     let all: Vec<f64> = store.temperatures()?.iter().map(|row| row.celsius).collect();
     let (least, most) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), celsius| {
@@ -131,12 +131,13 @@ fn temperature_c(store: &Store) -> Result<Option<[f64; 3]>, AnalyseError> {
     Ok((!all.is_empty()).then(|| [least, mean, most].map(|celsius| rounded(celsius, 4))))
 }
 
-/// What every calibration changed, in the order in which they were entered: against the first session for which it counts.
+/// The change made by every calibration, in the order of entry, relative to the first session to
+/// which it applies.
 fn calibrated(store: &Store) -> Result<Vec<Calibrated>, AnalyseError> {
     let (sessions, all) = (store.sessions()?, store.calibrations()?);
     let mut rows = Vec::new();
     for (n, own) in all.iter().enumerate() {
-        // one that counts from a session on that never came changed nothing
+        // a calibration that applies from a session which never took place changed nothing
         let Some((session, _)) = sessions.iter().find(|(id, _)| *id >= own.from_session) else { continue };
         let map = store.channels_as_measured(*session)?;
         let Some(channel) = map.channels.iter().find(|channel| channel.name == own.channel.as_str()) else {

@@ -1,7 +1,7 @@
-//! Findings: what the stages of an analysis found, each in its own type and without a word of prose.
+//! Findings: the results of the analysis stages, each in its own type and without text.
 //!
-//! [`crate::report::document()`] makes `results.json` of them. The stages hand on what the next ones need as arguments; none reads
-//! what another wrote here.
+//! [`crate::report::document()`] converts them to `results.json`. The stages pass data to later
+//! stages as arguments; none reads what another stored here.
 
 use super::contact_stage::Contact;
 use super::fits::Fit;
@@ -19,51 +19,52 @@ use crate::substructuring::Frf;
 use crate::substructuring::averaged::{Averaged, Priors};
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
 
-/// All that was found, as far as it was looked for.
+/// All findings of the stages that were run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {
-    /// What it was found from.
+    /// Provenance.
     pub source: Source,
-    /// How records became FRFs; none where no records of hits were read.
+    /// How records were converted to FRFs; `None` if no records of hits were read.
     pub settings: Option<Settings>,
     /// Kept and refused hits.
     pub completeness: Vec<Completeness>,
-    /// Where hammer and vibrometer went.
+    /// Positions of hammer and vibrometer.
     pub geometry: Vec<Place>,
-    /// How every cell was heard.
+    /// Data quality of every cell.
     pub heard: Heard,
-    /// Every cell of a campaign's plan, with how it was heard.
+    /// Every cell of a campaign's plan, with its data quality.
     pub cells: Option<Cells>,
-    /// Every firing of the hammer.
+    /// All firings of the hammer.
     pub hits: Vec<HitRow>,
-    /// What each configuration gave.
+    /// Results for each configuration.
     pub configurations: Vec<ConfigurationFindings>,
-    /// The FRFs between all channels and impacts of the geometry, measured or not, where they are wanted: of each configuration with a
-    /// kept hit, at the lines of the settings.
+    /// The FRFs between all channels and impacts of the geometry, measured or not, if requested:
+    /// for each configuration with a kept hit, at the lines of the settings.
     pub frfs: Vec<(Structure, Frf)>,
     /// Joint and interface, line by line.
     pub substructured: Option<Substructured>,
-    /// The fits that were asked for.
+    /// The fits that were requested.
     pub fits: Vec<Fit>,
-    /// What is assumed of positions and angles, where an estimate with an interval was tried in a campaign.
+    /// Assumed uncertainties of positions and angles, if an estimate with an interval was attempted
+    /// in a campaign.
     pub priors: Option<Priors>,
     /// The estimates to quote.
     pub recommended: Vec<Averaged>,
-    /// Hits drawn anew.
+    /// The bootstrap over hits.
     pub bootstrap: Option<Bootstrap>,
-    /// What the contact's own signals say in a campaign.
+    /// Results from the contact's signals in a campaign.
     pub contact: Option<Contact>,
-    /// The contact's own stiffness, in a campaign.
+    /// The contact stiffness, in a campaign.
     pub own_stiffness: Option<Result<Stiffness, ContactError>>,
     /// The stiffness between the arms, in a campaign.
     pub between_arms: Option<Result<BetweenArms, NoStiffness>>,
-    /// The loops of a record of its own.
+    /// The loops of a single record.
     pub record: Option<RecordLoops>,
-    /// What had to be done without, in the order it was noticed.
+    /// Missing data, in the order in which they were noticed.
     pub missing: Vec<Missing>,
 }
 
-/// How records became FRFs.
+/// Settings for converting records to FRFs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// The windows.
@@ -72,24 +73,24 @@ pub struct Settings {
     pub lines_hz: [f64; 2],
 }
 
-/// What a configuration gave.
+/// Results for one configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConfigurationFindings {
-    /// Which.
+    /// The configuration.
     pub configuration: Structure,
     /// Ids of the records used.
     pub records: Vec<i64>,
-    /// Where the hammer's force reaches.
+    /// The band excited by the hammer.
     pub usable_band: Option<UsableBand>,
-    /// FRFs to look at.
+    /// Example FRFs.
     pub frfs: Vec<FrfCurve>,
-    /// One FRF against its noise.
+    /// One FRF compared with its noise.
     pub noise_floor: Option<NoiseFloor>,
-    /// Where its FRFs came from, if they were measured elsewhere.
+    /// Source of its FRFs, if they were imported.
     pub imported: Option<ImportedFrom>,
 }
 
-/// Where FRFs came from.
+/// Source of imported FRFs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImportedFrom {
     /// The file.

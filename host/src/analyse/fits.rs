@@ -4,12 +4,12 @@ use crate::structure::Structure;
 use crate::substructuring::fit::{FitError, Fitted, Options, fit};
 use crate::substructuring::{Band, Frf, Geometry, IdmSet};
 
-/// A fit that was asked for.
+/// A requested fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// Its interface deformation modes.
     pub idms: IdmSet,
-    /// What came of it.
+    /// Its result.
     pub outcome: Result<Fitted, NoFit>,
 }
 
@@ -20,11 +20,12 @@ pub enum NoFit {
     ImportWithoutVariance,
     /// The file of this configuration has no variance.
     FileWithoutVariance(Structure),
-    /// It failed.
+    /// The fit failed.
     Failed(FitError),
 }
 
-/// The fit with each set of modes over each band; the FRFs are of A, B and AJB and hold their variance.
+/// The fit with each set of modes over each band; the FRFs are those of A, B and AJB, with their
+/// variance.
 pub fn fits(
     [a, b, ajb]: [&Frf; 3],
     geometry: &Geometry,

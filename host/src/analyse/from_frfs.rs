@@ -1,4 +1,4 @@
-//! From FRFs of A, B and the assembly to what they say of joint and interface: shared by campaigns and by `identify`.
+//! From FRFs of A, B and the assembly to joint and interface; used for campaigns and by `identify`.
 
 use super::checks::{BackCoupled, InternalsFound, SameStructures};
 use crate::results::MAIN_BAND;
@@ -13,40 +13,42 @@ use crate::substructuring::{
 };
 use std::collections::BTreeMap;
 
-/// What the FRFs say.
+/// Results from the FRFs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Substructured {
-    /// Method × IDM set × band.
+    /// One row per method, IDM set and band.
     pub rows: Vec<Row>,
-    /// The lines, Hz; none where nothing was identified.
+    /// The lines, Hz; empty if nothing was identified.
     pub frequency_hz: Vec<f64>,
-    /// Stiffness and damping over these lines, with the noise where it is known.
+    /// Stiffness and damping over these lines, with their noise if known.
     pub spectra: Vec<(JointSpectrum, Option<LineNoise>)>,
     /// Methods that refused this data.
     pub refused: Vec<Refused>,
     /// Quality of A's and B's virtual points.
     pub virtual_points: Vec<VirtualPointQuality>,
-    /// Which motions coupling adds.
+    /// The motions added by coupling.
     pub cmif: Result<Cmif, FrfError>,
-    /// n_i against n_c.
+    /// n_i and n_c.
     pub internals: Option<InternalsFound>,
     /// Whether A and B are the same alone and in the assembly.
     pub same_structures: Option<SameStructures>,
-    /// Whether A and B with the joint give the assembly.
+    /// Whether A and B with the joint reproduce the assembly.
     pub back_coupled: Option<BackCoupled>,
 }
 
 /// A row of the joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Its numbers.
+    /// Its values.
     pub joint: JointRow,
-    /// What the FRFs' noise alone moves the stiffness of one line by, N/m: median over the band; empty where it is not known.
+    /// Standard deviation of the stiffness of one line due to the FRFs' noise alone, N/m: median
+    /// over the band; empty if not known.
     pub noise_n_per_m: BTreeMap<Dof, f64>,
 }
 
 impl Substructured {
-    /// What the same FRFs that `found` was identified from say of joint and interface; `frfs` are of A, B and AJB.
+    /// Results for joint and interface from the FRFs from which `found` was identified; `frfs` are
+    /// those of A, B and AJB.
     pub fn of(frfs: [&Frf; 3], geometry: &Geometry, priors: &Priors, found: Identification) -> Self {
         let [a, b, ajb] = frfs;
         let [a, b, ajb] = [(a, &geometry.a), (b, &geometry.b), (ajb, &geometry.ajb)]
@@ -79,7 +81,7 @@ fn with_noise(joint: JointRow, spectra: &[(JointSpectrum, Option<LineNoise>)]) -
     Row { joint, noise_n_per_m }
 }
 
-/// The propagated noise of every spectrum, in their order; none where one of the three came without its variance.
+/// The propagated noise of every spectrum, in order; `None` if one of the three lacks its variance.
 fn noise_of_lines(frfs: [&Frf; 3], geometry: &Geometry, spectra: &[JointSpectrum]) -> Vec<Option<LineNoise>> {
     if frfs.iter().any(|frf| frf.variance().is_none()) {
         return vec![None; spectra.len()];
@@ -89,7 +91,7 @@ fn noise_of_lines(frfs: [&Frf; 3], geometry: &Geometry, spectra: &[JointSpectrum
         .flat_map(|of_set| {
             let methods: Vec<Method> = of_set.iter().filter_map(|s| s.method.parse().ok()).collect();
             let idms = IdmSet::of(&of_set[0].modes).filter(|_| methods.len() == of_set.len());
-            // what is refused here was refused by `identify` before, with the reason
+            // a refusal here was already reported by `identify`, with the reason
             idms.and_then(|idms| line_noise(frfs, geometry, &methods, idms).ok()).map_or_else(
                 || vec![None; of_set.len()],
                 |all| all.into_iter().map(|(_, noise)| noise.ok()).collect(),
@@ -98,7 +100,8 @@ fn noise_of_lines(frfs: [&Frf; 3], geometry: &Geometry, spectra: &[JointSpectrum
         .collect()
 }
 
-/// The assembly put together again, with the most modes that Eq. (A.1) was asked for with; none where it was not.
+/// The assembly recomputed by coupling, with the largest set of modes requested for Eq. (A.1);
+/// `None` if it was not requested.
 fn back_coupled(
     frfs: [&Frf; 3],
     geometry: &Geometry,
@@ -110,7 +113,8 @@ fn back_coupled(
     BackCoupled::of(&Explained::of(frfs, geometry, idms, MAIN_BAND, priors)?)
 }
 
-/// The matrix without the spare responses of A, which may be anything, and without points on specimens, which are on no arm.
+/// The matrix without the spare responses of A, which may contain NaN, and without points on
+/// specimens, which are not on an arm.
 fn without_spares(frf: &Frf, points: &Configuration) -> Frf {
     let is = |points: &[Point], names: &[String], name: &String, what: fn(Grouping) -> bool| {
         points.iter().zip(names).any(|(p, n)| n == name && what(p.grouping))
@@ -123,6 +127,6 @@ fn without_spares(frf: &Frf, points: &Configuration) -> Frf {
     let on_specimen = |name: &&String| is(&points.impacts, &inputs, name, Grouping::is_specimen);
     let kept: Vec<String> = frf.outputs().iter().filter(|name| !spare(name)).cloned().collect();
     let hit: Vec<String> = frf.inputs().iter().filter(|name| !on_specimen(name)).cloned().collect();
-    // these names were just taken from it
+    // the names were taken from this matrix, so the selection succeeds
     frf.select(&kept, &hit).unwrap_or_else(|_| frf.clone())
 }

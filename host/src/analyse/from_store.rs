@@ -1,4 +1,5 @@
-//! The campaign file as measurements: records decoded, in SI units, one cell at a time, from any thread.
+//! Access to a campaign file as measurements: records decoded, in SI units, one cell at a time,
+//! from any thread.
 
 use super::analyse_error::AnalyseError;
 use super::campaign::analyse_measurements;
@@ -29,33 +30,35 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-/// Scans kept before the trigger: the force window begins 1 ms before the pulse, which is 51 scans at 51.2 kHz.
+/// Time kept before the trigger, s: the force window begins 1 ms before the pulse, which is 51
+/// scans at 51.2 kHz.
 const LEAD_S: f64 = 1.25e-3;
 
-/// How much of each record is analysed: of all the same, so that their FRFs have the same lines.
+/// The part of each record that is analysed: the same length for all, so that their FRFs have the
+/// same lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AnalysedLength {
     /// The plan's length, s.
     plan_s: f64,
-    /// Of the kept records that came from files.
+    /// Lengths of the kept records that were imported from files.
     imported: Option<ImportedLengths>,
-    /// Whether records were measured here, which have the plan's length.
+    /// Whether records were measured in this campaign; these have the plan's length.
     measured: bool,
 }
 
-/// Lengths of the kept records that came from files, s.
+/// Lengths of the kept records that were imported from files, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ImportedLengths {
-    /// Of the shortest record, from its first sample on.
+    /// Length of the shortest record, from its first sample on.
     shortest: f64,
-    /// Of the longest record, from its first sample on.
+    /// Length of the longest record, from its first sample on.
     longest: f64,
-    /// Least and most of what follows a record's lead.
+    /// Shortest and longest length after the time kept before the trigger.
     from_lead: [f64; 2],
 }
 
 impl AnalysedLength {
-    /// Of the kept records of a campaign.
+    /// Lengths of the kept records of a campaign.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -93,16 +96,18 @@ impl AnalysedLength {
         Ok(found)
     }
 
-    /// The length of records that are used whole; `None` where the plan's length counts.
+    /// The length to which records are used from their first sample on; `None` if the plan's length
+    /// applies.
     fn whole_s(&self) -> Option<f64> {
         let imported = self.imported.filter(|_| !self.measured)?;
-        // a record of the plan's length has the lead beside it
+        // a record of the plan's length additionally contains the time before the trigger
         let as_planned = (0.0..=LEAD_S).contains(&(imported.from_lead[0] - self.plan_s));
         (!as_planned).then_some(imported.shortest)
     }
 
-    /// The samples of a record that are analysed, as far as it has them. Records that are used whole begin with their first sample,
-    /// so that their lines are those of their own length; of longer ones the end counts less than what is before the hit.
+    /// The range of samples of a record that is analysed. Records that are used whole begin with
+    /// their first sample, so that their lines are those of their own length; longer ones are cut
+    /// at the end before the part ahead of the hit is shortened.
     pub fn samples(&self, record: &RecordRow, rate_hz: f64) -> Range<usize> {
         let length = |seconds: f64| (seconds * rate_hz).round() as usize;
         let lead = first_sample(record, rate_hz);
@@ -115,7 +120,7 @@ impl AnalysedLength {
         }
     }
 
-    /// What is to be said of records from files that do not have the plan's length.
+    /// A message about imported records whose length differs from that of the plan.
     pub fn notice(&self) -> Option<String> {
         let ImportedLengths { shortest, longest, from_lead } = self.imported?;
         let plan_s = self.plan_s;
@@ -144,16 +149,19 @@ impl AnalysedLength {
     }
 }
 
-/// The first sample of a record that is analysed. A soft pulse needs more before the trigger, which is on its flank.
+/// The first sample of a record that is analysed. A soft pulse needs more samples before the
+/// trigger, because the trigger is on its flank.
 fn first_sample(record: &RecordRow, rate_hz: f64) -> usize {
     let lead_s = LEAD_S.max(1e-6 * f64::from(record.shot.width_us));
     record.trigger_index.saturating_sub((lead_s * rate_hz).ceil() as usize)
 }
 
-/// Everything that a campaign file says about the joint. What is `known` beforehand counts more than what the plan says.
+/// Analyses a campaign file for the joint. Values in `known` take precedence over those of the
+/// plan.
 ///
 /// # Errors
-/// The file itself cannot be read. What is missing or damaged in it is told in the findings instead.
+/// The file itself cannot be read. Missing or damaged parts of it are reported in the findings
+/// instead.
 pub fn analyse(
     store: &Store,
     wanted: Wanted,
@@ -168,14 +176,14 @@ pub fn analyse(
 
 pub(super) struct PlannedCell {
     pub(super) id: i64,
-    /// The cell whose hits fill this one, where it is not struck itself.
+    /// The cell whose hits fill this one, if it is not struck itself.
     pub(super) lead: Option<i64>,
     pub(super) name: CellName,
     row: CellRow,
     given_up: Option<String>,
 }
 
-/// A campaign file as measurements.
+/// A campaign file as a source of measurements.
 pub struct CampaignFile {
     pub(super) path: PathBuf,
     pub(super) plan: Plan,
@@ -187,12 +195,14 @@ pub struct CampaignFile {
     pub(super) records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
     channels: HashMap<i64, ChannelMap>,
     analysed: AnalysedLength,
-    /// Open connections that no thread uses at the moment: SQLite's cannot be shared, only handed on.
+    /// Open connections that no thread uses at the moment: an SQLite connection can be passed
+    /// between threads but not shared.
     idle: Mutex<Vec<Store>>,
 }
 
 impl CampaignFile {
-    /// Reads all but the samples. What is `known` beforehand counts more than what the plan says.
+    /// Reads everything except the samples. Values in `known` take precedence over those of the
+    /// plan.
     ///
     /// # Errors
     /// The file cannot be read, or its sessions measure different quantities.
@@ -250,18 +260,18 @@ impl CampaignFile {
         })
     }
 
-    /// The records that count for a cell: its own, and those of the cell whose hits fill it.
+    /// The records used for a cell: its own, and those of the cell whose hits fill it.
     fn records_for(&self, cell: &PlannedCell) -> impl Iterator<Item = &Result<RecordRow, Damaged>> {
         let struck = [Some(cell.id), cell.lead].into_iter().flatten();
         struck.filter_map(|id| self.records.get(&id)).flatten()
     }
 
-    /// Runs `work` with a connection of its own.
+    /// Runs `work` with a connection that no other thread uses.
     fn with_reader<T>(
         &self,
         work: impl FnOnce(&Store) -> Result<T, AnalyseError>,
     ) -> Result<T, AnalyseError> {
-        // a connection is whole even if the thread that used it panicked
+        // the list of connections is valid even after a poisoned lock
         let waiting = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let idle = waiting().pop();
         let store = match idle {
@@ -273,7 +283,8 @@ impl CampaignFile {
         result
     }
 
-    /// Reads a record's signals for a cell into `hit`, with those at the contact where they are asked for; gives its sampling rate, Hz.
+    /// Reads a record's signals for a cell into `hit`, including those at the contact if requested;
+    /// returns its sampling rate, Hz.
     fn read_hit(
         &self,
         store: &Store,
@@ -304,19 +315,19 @@ impl CampaignFile {
         hit.contact = at_contact.map(|(a, b)| {
             let mut signals = hit.contact.take().unwrap_or_default();
             signals.tangential_n.clear();
-            // one amplifier: the load cells are alike
+            // the load cells share one amplifier, so they have the same delay
             signals.delay_s =
                 ContactDelays { specimen_a: late(a), specimen_b: late(b), load_cells: late(cells[0].0) };
             signals
         });
-        // no channel is unpacked that nobody looks at
+        // unpack only the channels that are needed
         let mut wanted: Vec<usize> = std::iter::once(force).chain(responses.iter().copied()).collect();
         if let Some((a, b)) = at_contact {
             wanted.extend([a, b].into_iter().chain(cells.iter().map(|(place, _)| *place)));
         }
         let mut seen = HashSet::new();
         wanted.retain(|place| seen.insert(*place));
-        // exactly as many samples as the plan's length: half-hertz lines from two seconds
+        // exactly as many samples as the plan's length, so that two seconds give lines every 0.5 Hz
         let analysed = self.analysed.samples(record, rate);
         store.each_channel(record, &wanted, |place, codes| {
             let codes = &codes[analysed.start.min(codes.len())..analysed.end.min(codes.len())];
@@ -449,7 +460,7 @@ impl Measurements for CampaignFile {
     ) -> Result<Vec<String>, AnalyseError> {
         let Some(planned) = self.cells.iter().find(|c| c.name == *cell) else { return Ok(Vec::new()) };
         self.with_reader(|store| {
-            // the same memory for every hit
+            // reuse the same buffers for every hit
             let (mut left_out, mut rate_hz, mut hit) = (Vec::new(), None, Hit::default());
             for record in self.records_for(planned) {
                 let record = match record {
@@ -485,7 +496,7 @@ fn response_quantity<'a>(
 ) -> Result<MotionQuantity, AnalyseError> {
     let mut found: Vec<Quantity> = Vec::new();
     for map in maps {
-        // a vibrometer that comes to no point of the plan does not count
+        // ignore a vibrometer that measures no point of the plan
         let points = plan.geometry.response.iter().map(toml::Spanned::get_ref);
         for place in points.filter_map(|point| plan.response_places(&point.name, map)).flatten() {
             let quantity = map.channels[place].quantity;
@@ -495,7 +506,7 @@ fn response_quantity<'a>(
         }
     }
     match found[..] {
-        // nothing was connected yet: nothing will be read either
+        // nothing was connected yet, so nothing will be read either
         [] | [Quantity::Velocity] => Ok(MotionQuantity::Velocity),
         [Quantity::Displacement] => Ok(MotionQuantity::Displacement),
         [Quantity::Acceleration] => Ok(MotionQuantity::Acceleration),

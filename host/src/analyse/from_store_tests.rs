@@ -18,13 +18,14 @@ use std::path::Path;
 
 const RATE: u32 = 51_200;
 const TRIGGER: usize = 256;
-/// What the made-up loops have, N/m.
+/// Slope of the simulated loops, N/m.
 const SLOPE: f64 = 150e6;
 
-/// How late the responses are, ns.
+/// Delay of the responses, ns.
 const LATE_NS: u32 = 20_000;
 
-/// Channels with the rig's scales; polarity of B's vibrometer turned round, as the scale's sign says.
+/// Channels with the rig's scales; the polarity of B's vibrometer is inverted, as indicated by the
+/// sign of its scale.
 fn map(late_ns: u32) -> ChannelMap {
     let channel = |name: &str, role, quantity, units_per_volt| Channel {
         name: name.try_into().expect("short"),
@@ -47,8 +48,8 @@ fn map(late_ns: u32) -> ChannelMap {
     ChannelMap { id: 0, rate_hz: RATE, exact_hz: None, channels }
 }
 
-/// A hit at the trigger, and a decay at 208 Hz in everything else, late by the channel's delay; T and Δx in phase with the slope
-/// above.
+/// A hit at the trigger, and a decay at 208 Hz in all other channels, delayed by the channel's
+/// delay; T and Δx in phase with the slope above.
 fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
     let scans = TRIGGER + 2 * RATE as usize;
     let at = |scan: usize| (scan as f64 - TRIGGER as f64) / f64::from(RATE);
@@ -106,8 +107,8 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
     }
 }
 
-/// A campaign of which only AJB was measured: two good hits and a refused one in each of its cells. There is a session for each of
-/// the delays; the cells' hits take turns among them.
+/// A campaign in which only AJB was measured: two good hits and a refused one in each of its cells.
+/// There is one session for each of the delays; the cells' hits alternate between them.
 fn campaign(path: &Path, late_ns: &[u32]) -> Store {
     let mut store = Store::create(path, SMALL, "small.toml").expect("created");
     let info = SessionInfo {
@@ -158,7 +159,7 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     let slope = loops.slope_n_per_m;
     // 16-bit steps: 0.3 µm/s in 2 mm/s
     assert!((slope.mean / SLOPE - 1.0).abs() < 0.01, "{slope:?}");
-    // AZ1 counts, AY1 does not: two locations with two good hits
+    // AZ1 is used, AY1 is not: two locations with two good hits
     assert_eq!((slope.cycles, loops.slopes.len(), loops.records.len()), (4, 4, 4));
     let ajb = found.completeness.iter().find(|c| c.configuration == "AJB").expect("counted");
     assert_eq!((ajb.kept, ajb.refused["double hit"]), (8, 4));
@@ -172,7 +173,7 @@ fn a_campaign_that_stopped_half_way_gives_what_it_can() {
     assert!(frfs().count() > 0 && frfs().all(|c| c.step_hz == 0.5), "two seconds give half-hertz lines");
 }
 
-/// What the analysis makes substructuring's FRFs of.
+/// The FRFs that the analysis passes to substructuring.
 fn analysed(store: &Store) -> Frf {
     let file = CampaignFile::open(store, KnownContact::default()).expect("readable");
     let cells = file.cells();
@@ -193,7 +194,7 @@ fn analysed(store: &Store) -> Frf {
 fn two_sessions_are_exported_as_they_are_analysed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
-    // sixteen samples between the sessions
+    // a difference of sixteen samples between the sessions
     let store = campaign(&path("two.jrig"), &[LATE_NS, LATE_NS + 312_500]);
     let file = path("two.jrig");
     let out = path("out");
@@ -204,16 +205,16 @@ fn two_sessions_are_exported_as_they_are_analysed() {
     let exported = crate::exchange::read_frf(&out.join("frf/AJB.npz")).expect("written");
     let two = analysed(&store);
     assert!(two.variance().is_some() && exported.coherence().is_some(), "two hits");
-    // coherence is formed for export alone
+    // coherence is computed only for export
     assert_eq!(exported.lines(), two.lines(), "to the last bit");
     assert_eq!(exported.variance(), two.variance(), "to the last bit");
     assert_eq!([exported.outputs(), exported.inputs()], [two.outputs(), two.inputs()]);
     assert_eq!(exported.frequency_hz(), two.frequency_hz());
-    // each hit by its own session's delays: the same FRFs as in one session
+    // each hit is corrected by its own session's delays, so the FRFs equal those of one session
     let one = analysed(&campaign(&path("one.jrig"), &[LATE_NS]));
     for (line, f) in two.frequency_hz().iter().enumerate().filter(|(_, f)| (100.0..400.0).contains(*f)) {
         let difference = (&two.lines()[line] - &one.lines()[line]).norm();
-        // 16-bit steps; a delay forgotten would be 0.1 at 100 Hz and more above
+        // 16-bit steps; an uncorrected delay would cause 0.1 at 100 Hz and more above
         assert!(difference < 1e-3 * one.lines()[line].norm(), "{f} Hz: {difference}");
     }
 }
@@ -261,7 +262,7 @@ fn the_plan_becomes_a_geometry() {
 fn records_from_files_are_used_whole_where_nothing_was_measured() {
     let lengths = |range: Option<[f64; 2]>, measured| AnalysedLength {
         plan_s: 1.0,
-        // 10 ms before the lead
+        // 10 ms more than the time after the lead
         imported: range.map(|own| ImportedLengths {
             shortest: own[0] + 0.01,
             longest: own[1] + 0.01,
@@ -269,7 +270,8 @@ fn records_from_files_are_used_whole_where_nothing_was_measured() {
         }),
         measured,
     };
-    // nothing from a file, and records of the plan's length with the lead beside it: as planned, without a word
+    // no imported records, or imported records of the plan's length plus lead: as planned, without
+    // a message
     for alone in [lengths(None, true), lengths(Some([1.0, 1.001]), false), lengths(Some([1.0; 2]), true)] {
         assert_eq!((alone.whole_s(), alone.notice()), (None, None));
     }

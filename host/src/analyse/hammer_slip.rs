@@ -1,10 +1,11 @@
-//! Whether the contact slips under the hammer: every hit's response per newton, gathered by cell.
+//! Collects every hit's response per newton, by cell, to detect whether the contact slips under the
+//! hammer.
 
 use super::cell::{CellName, Hit};
 use crate::hysteresis::hammer_slip::{CellHits, HammerSlip};
 use crate::hysteresis::hit_response::{HitResponse, HitSignals};
 
-/// What one hit that moves the contact gives per newton of it.
+/// The response per newton of one hit that moves the contact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HitAtContact {
     /// Its cell: hits of one cell share place, aim and direction.
@@ -13,7 +14,7 @@ pub struct HitAtContact {
     pub response: HitResponse,
 }
 
-/// Of one hit; none where it lacks the contact's signals, or is too short.
+/// From one hit; `None` if it lacks the contact's signals, or is too short.
 pub fn of_hit(cell: &CellName, fs_hz: f64, hit: &Hit) -> Option<HitAtContact> {
     let signals = hit.contact.as_ref()?;
     let delays = signals.delay_s;
@@ -26,7 +27,7 @@ pub fn of_hit(cell: &CellName, fs_hz: f64, hit: &Hit) -> Option<HitAtContact> {
     Some(HitAtContact { cell: cell.clone(), response })
 }
 
-/// What all of them say; they come cell by cell.
+/// The verdict from all hits; they must be ordered by cell.
 pub fn told(hits: &[HitAtContact]) -> HammerSlip {
     let cells: Vec<CellHits<'_>> = hits
         .chunk_by(|a, b| a.cell == b.cell)

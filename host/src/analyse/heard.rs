@@ -1,34 +1,38 @@
-//! How well each cell was heard: coherence along the hit's own direction, and the random error that follows from it.
+//! Data quality of each cell: coherence along the hit's own direction, and the random error derived
+//! from it.
 
 use super::averages::CellAverage;
 use super::cell::CellName;
 use crate::results::{MAIN_BAND, rounded};
 use crate::substructuring::geometry::{Geometry, Point};
 
-/// Lines at which coherence is told: enough to see every dip, few enough to show all cells.
+/// Number of lines at which coherence is reported: enough to show every dip, few enough to show all
+/// cells.
 const SHOWN_LINES: usize = 140;
 
-/// How all cells were heard.
+/// Data quality of all cells.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Heard {
-    /// Where coherence is told, Hz: lines of the first cell, which all share.
+    /// Frequencies at which coherence is reported, Hz: lines of the first cell, which all cells
+    /// share.
     pub frequency_hz: Vec<f64>,
-    /// In the order in which they were averaged.
+    /// The cells, in the order in which they were averaged.
     pub cells: Vec<HeardCell>,
 }
 
-/// How one cell was heard.
+/// Data quality of one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeardCell {
-    /// Which.
+    /// The cell.
     pub name: CellName,
-    /// At [`Heard::frequency_hz`].
+    /// Coherence at [`Heard::frequency_hz`].
     pub coherence: Vec<f64>,
-    /// Of H1's magnitude, as a part of it: median over the main band; none with fewer than two hits.
+    /// Relative random error of the magnitude of H1: median over the main band; `None` with fewer
+    /// than two hits.
     pub random_error: Option<f64>,
 }
 
-/// Lines spread evenly over the logarithm, by index; each once.
+/// Indices of logarithmically spaced lines, without duplicates.
 fn shown(frequency_hz: &[f64]) -> Vec<usize> {
     let (Some(first), Some(last)) = (frequency_hz.first(), frequency_hz.last()) else { return Vec::new() };
     let mut lines: Vec<usize> = (0..SHOWN_LINES)
@@ -39,7 +43,7 @@ fn shown(frequency_hz: &[f64]) -> Vec<usize> {
     lines
 }
 
-/// All cells.
+/// Data quality of all cells.
 pub fn heard(geometry: &Geometry, cells: &[CellAverage]) -> Heard {
     let lines = cells.first().map_or(&[][..], |cell| cell.spectra.frequency_hz());
     Heard {
@@ -65,7 +69,7 @@ fn one(geometry: &Geometry, cell: &CellAverage) -> HeardCell {
     }
 }
 
-/// The channel of the cell's location that feels most of the hit's direction.
+/// The channel of the cell's location whose direction is closest to that of the hit.
 fn along_the_hit(geometry: &Geometry, name: &CellName) -> usize {
     let points = geometry.points(name.configuration);
     let Some(hit) = points.impacts.iter().find(|p| p.name == name.impact) else { return 0 };

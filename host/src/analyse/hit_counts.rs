@@ -1,8 +1,9 @@
-//! Kept and refused hits of a configuration.
+//! Numbers of kept and refused hits of a configuration.
 
 use crate::results::Completeness;
 
-/// From counts per cell: whether it is struck itself or filled by the hits of another, and (wanted, kept, refused by verdict).
+/// From counts per cell: whether the cell is struck itself rather than filled by the hits of
+/// another, and (planned, kept, refused by verdict).
 pub fn completeness<'a>(
     name: &str,
     cells: impl IntoIterator<Item = (bool, (usize, usize, Vec<(&'a str, usize)>))>,

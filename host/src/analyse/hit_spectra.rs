@@ -1,4 +1,5 @@
-//! Spectra of single hits, for the bootstrap: only the assembly's interface cells, only the main band.
+//! Spectra of single hits, for the bootstrap: only the assembly's interface cells, only the main
+//! band.
 
 use super::cell::{Cell, CellName};
 use crate::results::MAIN_BAND;
@@ -8,7 +9,8 @@ use crate::substructuring::averaged::CellHits;
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use num_complex::Complex;
 
-/// The spectra of every hit of a cell of the assembly's interface; none for another cell, or for a single hit.
+/// The spectra of every hit of a cell of the assembly's interface; `None` for another cell, or for
+/// a single hit.
 ///
 /// # Errors
 /// Hits that cannot be transformed.
@@ -22,7 +24,7 @@ pub fn of(
     let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
     let channels: Vec<&Point> =
         points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
-    // a location's channels stand in the records as they stand here
+    // records hold a location's channels in the order used here
     let all = cell.hits.iter().all(|hit| hit.response.len() == channels.len());
     let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
     if name.configuration != Structure::Ajb || channels.is_empty() || !all || !there || cell.hits.len() < 2 {

@@ -1,4 +1,4 @@
-//! The loops of the impacts: each counting hit's first cycle, and all of them together.
+//! The loops of the impacts: the first cycle of each hit used, and all of them combined.
 
 use super::cell::{ContactDelays, ContactSignals};
 use super::checks::HiddenResonance;
@@ -10,7 +10,7 @@ use crate::hysteresis::static_arm::Identified;
 use crate::hysteresis::{HysteresisError, OverCycles, Shape, delays};
 use crate::results::{DecayStep, ImpactSlope, LoopCurve, Reconstruction, rounded};
 
-/// A straight line that explains less of T than this is no clean loop.
+/// If a straight line explains less of T than this, the loop is not clean.
 const CLEAN_LINE: f64 = 0.9;
 
 /// One hit and its first cycle.
@@ -24,52 +24,53 @@ pub struct ImpactLoop {
     pub first: FirstCycle,
 }
 
-/// All first cycles together.
+/// All first cycles combined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImpactLoops {
     /// The records, in the order of the cells.
     pub records: Vec<i64>,
-    /// The shape that most have.
+    /// The most frequent shape.
     pub shape: Shape,
     /// Slope of T on Δx, N/m.
     pub slope_n_per_m: OverCycles,
-    /// The same with the corrected force; none where the static arm is not known.
+    /// The same with the corrected force; `None` if the static arm is not known.
     pub corrected_n_per_m: Option<OverCycles>,
-    /// What that slope may be called.
+    /// The name that this slope may be given.
     pub slope_is: SlopeIs,
     /// Mean frequency of the decays' main mode, Hz.
     pub frequency_hz: Option<f64>,
     /// Mean of half the swing of Δx, m.
     pub amplitude_m: Option<f64>,
-    /// Mean phase by which Δx lags T over the first cycle, degrees: that of the decay's first step.
+    /// Mean phase by which Δx lags T over the first cycle, degrees; equal to that of the decay's
+    /// first step.
     pub phase_deg: Option<f64>,
-    /// Cycles of which a straight line explains less than 90 % of T.
+    /// Number of cycles in which a straight line explains less than 90 % of T.
     pub open: usize,
     /// The decay's cycles over all hits.
     pub decay: Vec<DecayStep>,
-    /// The slopes one by one.
+    /// The slopes of the single hits.
     pub slopes: Vec<ImpactSlope>,
 }
 
-/// What the slope of the first cycles may be called.
+/// The name that the slope of the first cycles may be given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SlopeIs {
-    /// k_T: the loops are straight, and no resonance hides in them.
+    /// k_T: the loops are straight, and there is no hidden resonance.
     Contact,
     /// k_eq: the loops are not straight.
     NotStraight,
-    /// k_eq: a resonance of one specimen, here in Hz, is in it.
+    /// k_eq: it includes a resonance of one specimen, at this frequency in Hz.
     Resonant(f64),
-    /// k_eq: whether one is in it cannot be told.
+    /// k_eq: whether it includes such a resonance is undecided.
     Undecided,
-    /// k_eq: the contact slips under the hammer, so that the slope goes with the force.
+    /// k_eq: the contact slips under the hammer, so the slope depends on the force.
     Slipping,
 }
 
 /// Analyses one hit.
 ///
 /// # Errors
-/// The signals hold no whole cycle, or are no numbers.
+/// The signals hold no whole cycle, or contain values that are not finite.
 pub fn of_hit(
     record: i64,
     impact: &str,
@@ -81,7 +82,7 @@ pub fn of_hit(
     Ok(ImpactLoop { record, impact: impact.into(), first: FirstCycle::of(fs_hz, [a, b], force_n)? })
 }
 
-/// v_A, v_B and T with their delays against each other taken out.
+/// v_A, v_B and T with their relative delays removed.
 fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<f64>; 3] {
     let ContactSignals { specimen_a_m_per_s, specimen_b_m_per_s, tangential_n, .. } = contact;
     let delays = [delays.specimen_a, delays.specimen_b, delays.load_cells];
@@ -89,7 +90,7 @@ fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<
     delays::in_step(signals.map(Vec::clone), delays, fs_hz)
 }
 
-/// All first cycles together; none without any.
+/// All first cycles combined; `None` without any.
 pub fn gathered(
     loops: &[ImpactLoop],
     arm: Option<&Identified>,
@@ -101,7 +102,7 @@ pub fn gathered(
         OverCycles::of(&values.collect::<Vec<_>>())
     };
     let mean = |value: fn(&FirstCycle) -> f64| over(&value).map(|v| v.mean);
-    // slip that leaves the decay's frequency alone is still slip
+    // slip that does not change the decay's frequency is still slip
     let shape = match most_common(loops)? {
         Shape::Stuck if slips => Shape::Microslip,
         other => other,
@@ -153,7 +154,7 @@ fn most_common(loops: &[ImpactLoop]) -> Option<Shape> {
         .filter(|_| !loops.is_empty())
 }
 
-/// The slopes one by one.
+/// The slopes of the single hits.
 fn slopes(loops: &[ImpactLoop]) -> Vec<ImpactSlope> {
     loops
         .iter()
@@ -166,7 +167,7 @@ fn slopes(loops: &[ImpactLoop]) -> Vec<ImpactSlope> {
         .collect()
 }
 
-/// The loop to show: the one whose slope is the middle of all.
+/// The loop to show: the one with the median slope.
 pub fn middle(loops: &[ImpactLoop]) -> Option<&ImpactLoop> {
     let mut sorted: Vec<&ImpactLoop> = loops.iter().filter(|l| l.first.slope_n_per_m.is_finite()).collect();
     sorted.sort_by(|a, b| a.first.slope_n_per_m.total_cmp(&b.first.slope_n_per_m));
@@ -179,7 +180,7 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
     let [start, end] = shown.first.cycle;
     let lead = (end - start) / 10;
     let from = start.saturating_sub(lead);
-    // the paper shows the fourth cycle too, which a longer period puts later
+    // the paper also shows the fourth cycle, which ends later if the period is longer
     let fourth = shown.first.decay.get(3).map_or(0, |cycle| cycle.end_sample);
     let to = (start + 4 * (end - start)).max(fourth).min(force_n.len());
     let offset = |v: &[f64]| {
@@ -203,19 +204,20 @@ pub fn drawn(shown: &ImpactLoop, fs_hz: f64, contact: &ContactSignals, delays: C
     }
 }
 
-/// The first cycle and those of the decay after it, as samples of what is shown.
+/// The sample ranges of the first cycle and the following ones within the part shown.
 fn cycles(first: &FirstCycle, from: usize, to: usize) -> Vec<[usize; 2]> {
     let all = first.decay.iter().map(|one| [one.first_sample, one.end_sample]);
     all.filter(|[a, b]| *a >= from && a < b && *b <= to).map(|[a, b]| [a - from, b - from]).collect()
 }
 
-/// Length of the decay that is put together again, s: long enough to tell 192 Hz from 208 Hz.
+/// Length of the reconstructed decay, s: long enough to resolve 192 Hz and 208 Hz.
 const REBUILT_S: f64 = 0.1;
 
-/// Every so many samples are kept of it.
+/// Only every nth sample of it is kept.
 const THINNED: usize = 8;
 
-/// The specimens' decay from the second cycle on, put together from the hidden resonance and the common mode.
+/// The specimens' decay from the second cycle on, reconstructed from the hidden resonance and the
+/// common mode.
 pub fn rebuilt(
     shown: &ImpactLoop,
     fs_hz: f64,

@@ -1,4 +1,4 @@
-//! FRFs that were measured elsewhere stand in for a configuration that was not measured here.
+//! Imported FRFs, used for a configuration that was not measured in this campaign.
 
 use super::cell::Measurements;
 use super::missing::Missing;
@@ -8,7 +8,7 @@ use crate::structure::Structure;
 /// The imported FRFs of a configuration that has no averaged cell, if there are any.
 ///
 /// # Errors
-/// They cannot be read; or hits were measured too, and these count.
+/// They cannot be read; or hits were measured as well, which take precedence.
 pub fn of<M: Measurements>(
     measurements: &M,
     configuration: Structure,

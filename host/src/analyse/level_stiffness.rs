@@ -1,4 +1,5 @@
-//! k_T of the shaker's steady levels: each corrected by what the hits told, or why it has none.
+//! k_T of the shaker's steady levels, each corrected with the results from the hits, or the reason
+//! why it has none.
 
 use super::averages::CellAverage;
 use super::cell::{Measurements, ShakerLevel};
@@ -9,42 +10,46 @@ use crate::contact::{
 use crate::hysteresis::tones::Tones;
 use crate::hysteresis::{LoopAnalysis, LoopFinding, Shape};
 
-/// Stretches of a record whose scatter is its noise: enough to know a standard deviation to a quarter.
+/// Number of stretches of a record whose scatter gives its noise: enough to determine a standard
+/// deviation to a quarter.
 const STRETCHES: usize = 10;
 
-/// Half width of the interval over k_T above which a level's value is not called k_T. Scripts and people read the mean without its interval as
-/// well: what it is called must not mislead them by more than a tenth. T/Δx between the spots is off by more than that at most frequencies.
+/// If the half width of the interval over k_T exceeds this, a level's value is not called k_T. The
+/// mean is also read without its interval, by scripts and people, so its name must not mislead by
+/// more than a tenth. T/Δx between the measured points is off by more than that at most
+/// frequencies.
 const WIDEST: f64 = 0.1;
 
-/// Standard deviations of their difference by which a level's k_T may be apart from that of the hits: beyond, one of both is wrong, and of the
-/// two the level rests on more.
+/// Largest difference between the k_T of a level and that of the hits, in standard deviations of
+/// the difference: beyond it, one of the two is wrong, and the level depends on more assumptions.
 const APART: f64 = 4.0;
 
-/// What a level's k_T is, or why it has none.
+/// A level's k_T, or the reason why it has none.
 pub type Outcome = Result<LevelStiffness, NoLevelStiffness>;
 
 /// Why a level has no k_T.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoLevelStiffness {
-    /// The contact was not read from the hits.
+    /// The contact was not identified from the hits.
     NoContact,
-    /// It was, but an assumption does not hold.
+    /// It was identified, but an assumption is violated.
     Doubted,
-    /// It slips under the hammer.
+    /// The contact slips under the hammer.
     SlipsUnderTheHammer,
     /// The level's own loop slips.
     Slips,
-    /// Something is wrong with the level's loop.
+    /// The level's loop has a fault.
     Finding(LoopFinding),
-    /// It cannot be corrected.
+    /// The level cannot be corrected.
     Level(LevelError),
-    /// It contradicts the hits: by so many standard deviations.
+    /// It contradicts the hits, by this many standard deviations.
     Apart(f64),
-    /// It can, but not well enough: half width of its interval over k_T.
+    /// It can be corrected, but not accurately enough: half width of its interval over k_T.
     Wide(f64),
 }
 
-/// The levels' k_T, one for each steady level and its loop with the raw force. `slips` is what the hits say of the contact.
+/// The levels' k_T, one for each steady level and its loop with the raw force. `slips` is the
+/// verdict from the hits.
 pub fn of<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
@@ -79,19 +84,22 @@ pub fn of<M: Measurements>(
     usable.into_iter().map(outcome).collect()
 }
 
-/// k_T of the hits and of those levels together that have one; none where there is none, or they add nothing.
+/// k_T of the hits combined with that of the levels that have one; `None` if there is none, or if
+/// they add nothing.
 pub fn together(own: Result<&(Stiffness, Known), &ContactError>, levels: &[Outcome]) -> Option<Joint> {
     let (hits, known) = own.ok()?;
     let levels: Vec<&LevelStiffness> = levels.iter().flatten().collect();
     if levels.is_empty() { None } else { joint(hits, known, &levels) }
 }
 
-/// The amplitudes of a level that sticks. An ellipse sticks as well: what opens it is taken out here.
+/// The amplitudes of a level that sticks. An ellipse sticks too: the cause of its area is corrected
+/// here.
 fn steady(level: &ShakerLevel, raw: &LoopAnalysis) -> Result<SteadyLevel, NoLevelStiffness> {
     if !matches!(raw.shape, Shape::Stuck | Shape::Elliptical) {
         return Err(NoLevelStiffness::Slips);
     }
-    // a force that seems late beside a resonance is early motion of the spots; what delays may be is in the fit
+    // near a resonance a force that seems late is in fact an early motion of the measured points;
+    // the fit includes the possible delays
     let wrong = |finding: &&LoopFinding| {
         matches!(finding, LoopFinding::Hum { .. } | LoopFinding::FrequencyOff { .. })
     };

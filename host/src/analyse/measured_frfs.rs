@@ -1,4 +1,4 @@
-//! The FRFs of one configuration of a campaign file, at any lines.
+//! The FRFs of one configuration of a campaign file, over any range of lines.
 
 use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 impl CampaignFile {
-    /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the geometry, formed as the analysis
-    /// forms them, with the number of hits in each (outputs × inputs); and what is said about cells and records that cannot be used. None
-    /// without a kept hit.
+    /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the
+    /// geometry, computed as in the analysis, with the number of hits in each (outputs × inputs);
+    /// and messages about cells and records that cannot be used. `None` without a kept hit.
     pub fn measured(
         &self,
         structure: Structure,

@@ -1,4 +1,4 @@
-//! What an analysis had to do without, and why.
+//! Data missing in an analysis, and the reasons.
 
 use super::cell::CellName;
 use crate::campaign::plan::level::Level;
@@ -7,14 +7,14 @@ use crate::structure::Structure;
 use crate::substructuring::averaged::AveragedError;
 use crate::substructuring::{CommonLines, FrfError, IdentifyError};
 
-/// One thing that was done without. Errors that come from files are kept as they were told.
+/// One missing item. Messages of errors from files are kept unchanged.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Missing {
-    /// Something is wrong with a cell's records.
+    /// A cell's records have a fault.
     Records {
         /// The cell.
         cell: CellName,
-        /// What.
+        /// The fault.
         told: String,
     },
     /// A record gives no loop.
@@ -23,10 +23,10 @@ pub enum Missing {
         cell: CellName,
         /// The record.
         record: i64,
-        /// Why.
+        /// The reason.
         error: HysteresisError,
     },
-    /// Cells of one response location that were given up for one reason.
+    /// Cells of one response location that were abandoned for the same reason.
     GivenUp {
         /// The configuration.
         configuration: Structure,
@@ -36,7 +36,7 @@ pub enum Missing {
         impacts: Vec<String>,
         /// Cells of this location in the plan.
         planned: usize,
-        /// Why, as it was noted.
+        /// The reason as entered.
         reason: String,
     },
     /// The plan has no cell of this configuration.
@@ -48,20 +48,20 @@ pub enum Missing {
         /// Its cells in the plan.
         planned: usize,
     },
-    /// Some have none.
+    /// Some cells have no kept hit.
     CellsWithoutHit {
         /// The configuration.
         configuration: Structure,
-        /// How many.
+        /// Their number.
         absent: usize,
         /// Its cells in the plan.
         planned: usize,
     },
-    /// So many cells have a single hit, and so no coherence.
+    /// Cells with a single hit, and therefore without coherence.
     SingleHits {
         /// The configuration.
         configuration: Structure,
-        /// How many.
+        /// Their number.
         cells: usize,
     },
     /// Impacts that substructuring cannot use, because cells are missing.
@@ -71,36 +71,37 @@ pub enum Missing {
         /// Their names.
         names: Vec<String>,
     },
-    /// Response locations that it cannot use.
+    /// Response locations that substructuring cannot use, because cells are missing.
     ResponsesLeftOut {
         /// The configuration.
         configuration: Structure,
         /// Their names.
         names: Vec<String>,
     },
-    /// FRFs from elsewhere cannot be read.
+    /// Imported FRFs cannot be read.
     ImportUnreadable {
         /// The configuration.
         configuration: Structure,
-        /// What is wrong.
+        /// The fault.
         told: String,
     },
-    /// FRFs from elsewhere stand back behind hits of this campaign.
+    /// Imported FRFs are not used, because hits of this campaign take precedence.
     ImportUnused {
         /// The configuration.
         configuration: Structure,
-        /// Where they came from.
+        /// The file they were imported from.
         file: String,
         /// Cells with hits.
         cells: usize,
     },
-    /// A cell's signals at the contact have other lines than the rest, and do not count there.
+    /// A cell's signals at the contact have different lines than the others, and are not used
+    /// there.
     OtherLines(CellName),
-    /// Configurations without which there is no substructuring.
+    /// Missing configurations, without which there is no substructuring.
     Configurations(Vec<Structure>),
-    /// The three configurations have lines in common, and others that are left out.
+    /// The lines of the three configurations differ; only the common ones are used.
     LinesLeftOut(CommonLines),
-    /// The three configurations do not fit together.
+    /// The three configurations do not match.
     Substructuring(IdentifyError),
     /// No CMIF.
     Cmif(FrfError),
@@ -114,14 +115,14 @@ pub enum Missing {
     LevelLoop {
         /// The level.
         level: Level,
-        /// Why.
+        /// The reason.
         error: HysteresisError,
     },
-    /// The static arm's effective mass, without which there is no corrected force.
+    /// The static arm's effective mass is not known, so there is no corrected force.
     EffectiveMass,
 }
 
-/// Cells given up, those of one location and one reason together.
+/// Abandoned cells, grouped by location and reason.
 pub fn given_up(planned: &[CellName], cells: Vec<(CellName, String)>) -> Vec<Missing> {
     let mut groups: Vec<(Structure, String, String, Vec<String>)> = Vec::new();
     for (cell, reason) in cells {

@@ -1,12 +1,14 @@
 //! From a campaign to findings: everything is computed from the campaign file alone.
 //!
-//! The way through the room: [`analyse`] opens the file ([`Measurements`] is what the stages ask of it), and the stages follow one
-//! another as `campaign.rs` calls them: cells, configurations, what the FRFs say, the estimates to quote, the fit, the contact.
-//! Each returns what it found in a type of its own; together they are the [`Findings`].
+//! Processing order: [`analyse`] opens the file ([`Measurements`] is the interface that the stages
+//! use), and `campaign.rs` calls the stages one after another: cells, configurations, results from
+//! the FRFs, the estimates to quote, the fit, the contact. Each returns its results in a separate
+//! type; together they form the [`Findings`].
 //!
-//! Cells are read one at a time on each thread and averaged at once, so that memory holds the signals of a few
-//! cells, never of a campaign. What is missing is told in [`Findings::missing`] and done without: hysteresis needs the
-//! assembly only, substructuring needs all three configurations.
+//! Cells are read one at a time on each thread and averaged immediately, so that memory holds the
+//! signals of a few cells, never of a whole campaign. Missing data are reported in
+//! [`Findings::missing`], and the analysis continues without them: hysteresis needs only the
+//! assembly, substructuring needs all three configurations.
 
 mod analyse_error;
 mod arm_from_hits;

@@ -5,15 +5,16 @@ use crate::results::Place;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 
-/// The plan's points in the shape that substructuring knows, in the interface's coordinates, whose z is the sliding direction: a channel
-/// for each axis of a response, in the order in which records hold them. Blocks of one configuration add up.
+/// Converts the plan's points to the types of substructuring, in the interface's coordinates, whose
+/// z is the sliding direction: one channel for each axis of a response, in the order in which
+/// records hold them. Blocks of one configuration are merged.
 pub fn geometry(plan: &Plan) -> Geometry {
     let rows = plan.to_interface();
-    // where z slides, not even rounding may move anything
+    // if the sliding direction is already z, coordinates must stay exact, without rounding
     in_coordinates(plan, &|v| if plan.slides_along_z() { v } else { turned(&rows, v) })
 }
 
-/// The same in the plan's own coordinates, which labels of files are in.
+/// The same in the plan's own coordinates, which the labels of files use.
 pub fn geometry_as_planned(plan: &Plan) -> Geometry {
     in_coordinates(plan, &|v| v)
 }
@@ -61,7 +62,7 @@ fn in_coordinates(plan: &Plan, to_interface: &dyn Fn([f64; 3]) -> [f64; 3]) -> G
     geometry
 }
 
-/// Where hammer and vibrometer go, as the plan says: responses, then impacts.
+/// Positions of hammer and vibrometer according to the plan: responses, then impacts.
 pub fn places(plan: &Plan) -> Vec<Place> {
     let geometry = &plan.geometry;
     let responses = geometry.response.iter().map(toml::Spanned::get_ref).map(|p| Place {

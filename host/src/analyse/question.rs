@@ -1,4 +1,5 @@
-//! Identification from FRFs measured anywhere: what `jointrig identify` and the Python door ask for, and what came of it.
+//! Identification from FRFs of any source: the requests of `jointrig identify` and of the Python
+//! module, and their results.
 
 use super::fits::{Fit, NoFit, fits};
 use super::wanted::BANDS;
@@ -13,22 +14,24 @@ use crate::substructuring::{
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// What to identify, and how.
+/// What to identify, and with which settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
-    /// Decoupling methods; empty for all that work line by line.
+    /// Decoupling methods; empty for all line-by-line methods.
     pub methods: Vec<Asked>,
     /// Sets of interface deformation modes; empty for 2, 4 and 6.
     pub idms: Vec<IdmSet>,
-    /// Bands; empty for the usual ones, as far as the FRFs reach.
+    /// Bands; empty for the default ones that the FRFs cover.
     pub bands: Vec<Band>,
-    /// How well places and directions are known.
+    /// Uncertainties of positions and directions.
     pub priors: Priors,
     /// For the fit: K and C full and symmetric instead of diagonal.
     pub full_joint: bool,
-    /// For the fit of FRFs without variance: noise of each value's real and of its imaginary part, as a fraction of the rms at the line.
+    /// For the fit of FRFs without variance: noise of the real and of the imaginary part of each
+    /// value, as a fraction of the rms at the line.
     pub noise: Option<f64>,
-    /// For the fit: how much A and B alone may differ from A and B in the assembly (standard deviation), as a fraction of their admittance.
+    /// For the fit: standard deviation of the difference between A and B alone and A and B in the
+    /// assembly, as a fraction of their admittance.
     pub mounting: f64,
 }
 
@@ -49,7 +52,7 @@ impl Default for Question {
 /// Why nothing was computed.
 #[derive(Debug, thiserror::Error)]
 pub enum QuestionError {
-    /// The usual bands are elsewhere.
+    /// None of the default bands contains a line of the files.
     #[error(
         "none of the default bands holds a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
     )]
@@ -59,16 +62,17 @@ pub enum QuestionError {
         /// Last line, Hz.
         last: Option<f64>,
     },
-    /// FRFs and geometry do not fit one another.
+    /// FRFs and geometry do not match.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
 }
 
 impl Question {
-    /// What these FRFs of A, B and the assembly say, on the lines that all three have.
+    /// Results from these FRFs of A, B and the assembly, on the lines that all three have.
     ///
     /// # Errors
-    /// FRFs, geometry and bands do not fit one another. What one method cannot do stands among the findings.
+    /// FRFs, geometry and bands do not match. Failures of single methods are reported in the
+    /// findings instead.
     pub fn answered(
         &self,
         source: Source,
@@ -94,10 +98,10 @@ impl Question {
             found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
             found.substructured = Some(of_frfs);
         }
-        // the estimates with an interval need whole rigid motions
+        // the estimates with an interval need all six rigid motions
         if idms.contains(&IdmSet::Six) && methods.contains(&Method::Inverse) {
             let of = |band| averaged(&ajb, geometry, IdmSet::Six, band, &self.priors);
-            // where it cannot be had, the reason is among the refusals of `inverse` already
+            // if it fails, the refusals of `inverse` already state the reason
             found.recommended = bands.iter().filter_map(|band| of(*band).ok()).collect();
         }
         if self.methods.contains(&Asked::Fit) {
@@ -106,10 +110,11 @@ impl Question {
         Ok(found)
     }
 
-    /// Whether every method and every set of modes that was named gave a row, and whether any row is a number.
+    /// Checks that every requested method and set of modes gave a row, and that at least one row is
+    /// a number.
     ///
     /// # Errors
-    /// The reasons, one in a line.
+    /// The reasons, one per line.
     pub fn was_answered(&self, results: &Results) -> Result<(), String> {
         let of_method =
             |row: &Joint, asked: &Option<Asked>| asked.is_none_or(|asked| row.method == asked.name());
@@ -152,10 +157,10 @@ impl Question {
     }
 }
 
-/// A method as it may be asked for.
+/// A method that can be requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
-    /// One that works line by line.
+    /// A line-by-line method.
     ByLine(Method),
     /// Maximum likelihood over all lines.
     Fit,
@@ -181,12 +186,12 @@ impl FromStr for Asked {
     }
 }
 
-/// What was named, or the one wish for anything.
+/// The named items, or a single `None` that stands for any.
 fn any_or<T: Copy>(named: &[T]) -> Vec<Option<T>> {
     if named.is_empty() { vec![None] } else { named.iter().copied().map(Some).collect() }
 }
 
-/// One line for each reason, with the methods it stopped.
+/// One line for each reason, with the methods that it affects.
 fn refusals(results: &Results) -> Option<String> {
     let mut by_reason: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for r in &results.refused {
@@ -197,7 +202,7 @@ fn refusals(results: &Results) -> Option<String> {
     (!lines.is_empty()).then(|| lines.join("\n"))
 }
 
-/// The default bands that hold a line of the files.
+/// The default bands that contain a line of the files.
 fn default_bands(frf: &Frf) -> Result<Vec<Band>, QuestionError> {
     let bands: Vec<Band> =
         BANDS.into_iter().filter(|band| frf.frequency_hz().iter().any(|f| band.contains(*f))).collect();
@@ -208,7 +213,8 @@ fn default_bands(frf: &Frf) -> Result<Vec<Band>, QuestionError> {
     Ok(bands)
 }
 
-/// What one word of modes asks for: the paper's sets by their sizes, or one set by its modes.
+/// Sets of modes parsed from one argument: the paper's sets given by size, or one set given by its
+/// modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdmSets(pub Vec<IdmSet>);
 

@@ -1,4 +1,4 @@
-//! The estimates to quote, and the bootstrap over hits where it was asked for.
+//! The estimates to quote, and the bootstrap over hits if it was requested.
 
 use super::missing::Missing;
 use super::wanted::BANDS;
@@ -6,7 +6,7 @@ use crate::results::{Bootstrap, MAIN_BAND};
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
 use crate::substructuring::{Frf, Geometry, IdmSet};
 
-/// The bootstrap's seed: the same file gives the same figures.
+/// Seed of the bootstrap; fixed, so that the same file gives the same figures.
 const SEED: u64 = 1;
 
 /// The estimates to quote.
@@ -14,13 +14,14 @@ const SEED: u64 = 1;
 pub struct Recommended {
     /// One for each band.
     pub estimates: Vec<Averaged>,
-    /// Hits drawn anew, over the main band.
+    /// The bootstrap over hits, for the main band.
     pub bootstrap: Option<Bootstrap>,
-    /// What there is not.
+    /// Results that are not available.
     pub missing: Vec<Missing>,
 }
 
-/// The estimates to quote, with their intervals, from the assembly alone; `replicates` of the bootstrap.
+/// The estimates to quote, with their intervals, from the assembly only; `replicates` is the number
+/// of bootstrap replicates.
 pub fn recommended(
     geometry: &Geometry,
     ajb: &Frf,

@@ -1,4 +1,5 @@
-//! A whole small campaign made up from a known joint: two masses on springs, coupled, hit and measured.
+//! A complete small simulated campaign with a known joint: two masses on springs, coupled, hit and
+//! measured.
 
 use super::assemble;
 use super::campaign::analyse_measurements;
@@ -21,12 +22,13 @@ const SIGMA: f64 = 2.3;
 /// Contact stiffness in z, N/m.
 const CONTACT: f64 = 180e6;
 
-/// A rig of rigid bodies guided along z: A (mass m_a on k_a), B (m_b on k_b); every point of a body moves alike in z.
+/// A rig of rigid bodies guided along z: A (mass m_a on k_a), B (m_b on k_b); all points of a body
+/// have the same motion in z.
 struct Rig {
     geometry: Geometry,
     /// Cells that were not measured.
     absent: BTreeSet<(Structure, String, String)>,
-    /// One newton on A alone, on B alone, on A and on B in the assembly.
+    /// Responses to a hit of one newton on A alone, on B alone, and on A and on B in the assembly.
     units: [Unit; 4],
 }
 
@@ -93,7 +95,8 @@ impl Rig {
         }
     }
 
-    /// A point on specimen A, which moves otherwise than its arm, measured with hits along z on A in the assembly and nowhere else.
+    /// Adds a point on specimen A, whose motion differs from that of its arm; it is measured only
+    /// with hits along z on A in the assembly.
     fn with_specimen(mut self) -> Self {
         let ajb = &mut self.geometry.ajb;
         ajb.channels.extend(location("S1", Grouping::SpecimenA, [0.009, 0.002, 0.03]));
@@ -116,8 +119,8 @@ impl Rig {
     }
 }
 
-/// Force and velocities of both bodies along one axis after a half-sine hit of 1 N on A or B: velocity Verlet at 6 µs.
-/// The pulse is 25 samples long, so that its aliases stay below 1e-3.
+/// Force and velocities of both bodies along one axis after a half-sine hit of 1 N on A or B:
+/// velocity Verlet at 6 µs. The pulse is 25 samples long, so that its aliases stay below 1e-3.
 fn unit_hit(coupled: bool, on_a: bool) -> Unit {
     let (m, k, c) = ([4.0, 2.0], [8e6, 150e6], [120.0, 900.0]);
     let (contact, damper) = if coupled { (CONTACT, 600.0) } else { (0.0, 0.0) };
@@ -146,7 +149,7 @@ fn unit_hit(coupled: bool, on_a: bool) -> Unit {
         }
         let half = [v[0] + 0.5 * dt * a[0], v[1] + 0.5 * dt * a[1]];
         x = [x[0] + dt * half[0], x[1] + dt * half[1]];
-        // damping at the half step's velocity advanced by the old acceleration
+        // damping uses the half-step velocity advanced by the old acceleration
         let ahead = [half[0] + 0.5 * dt * a[0], half[1] + 0.5 * dt * a[1]];
         a = acceleration(x, ahead, hit(t + dt));
         v = [half[0] + 0.5 * dt * a[0], half[1] + 0.5 * dt * a[1]];
@@ -214,7 +217,7 @@ impl Measurements for Rig {
             .into_iter()
             .enumerate()
             .map(|(i, peak)| {
-                // y and z of a body are alike, each moved by hits along it only
+                // y and z of a body are equivalent, each excited only by hits along it
                 let scaled = |signal: &[f64]| signal.iter().map(|s| s * peak).collect::<Vec<f64>>();
                 let (still, moved) = (vec![0.0; SAMPLES], scaled(&unit.velocity[usize::from(!seen_on_a)]));
                 let moved: Vec<f64> = moved.into_iter().map(|v| apart * v).collect();
@@ -225,7 +228,7 @@ impl Measurements for Rig {
                 };
                 let contact = (coupled && along_z).then(|| {
                     let [a, b] = [0, 1].map(|body| scaled(&unit.velocity[body]));
-                    // the load cells are B's spring
+                    // the load cells measure the force in B's spring
                     let x_b = crate::hysteresis::integration::open_record(&b, 0.0, 1.0 / FS_HZ);
                     let tangential_n = x_b.iter().map(|x| 150e6 * x).collect();
                     ContactSignals {
@@ -259,7 +262,7 @@ fn rows(found: &Findings) -> Vec<&JointRow> {
     found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).collect()
 }
 
-/// A row of the paper's method over the main band, with a stiffness along z.
+/// Whether there is a row of the paper's method over the main band with a stiffness along z.
 fn headline(found: &Findings) -> bool {
     rows(found).iter().any(|row| {
         row.band_hz == MAIN_BAND
@@ -283,11 +286,11 @@ fn a_known_joint_comes_back_both_ways() {
         .find(|j| j.method == "internal" && j.idms == 2 && j.band_hz == MAIN_BAND)
         .expect("two modes are all this rig has");
     let k = two.stiffness_n_per_m[&Dof::Z];
-    // aliases of the pulse, 1e-3, grow by |Y_A + Y_B| / |Y_J|, about ten here
+    // aliases of the pulse, 1e-3, are amplified by |Y_A + Y_B| / |Y_J|, about ten here
     assert!((k.mean / CONTACT - 1.0).abs() < 0.03, "{k:?}");
     let contact = found.contact.as_ref().expect("looked for");
     let impacts = contact.impacts.as_ref().expect("hits along z on A");
-    // T is B's spring force, from which B's inertia is missing: some tens of per cent at this rig's mode
+    // T is B's spring force, which lacks B's inertia: some tens of per cent at this rig's mode
     let slope = impacts.slope_n_per_m.mean;
     assert!((0.5..2.0).contains(&(slope / CONTACT)), "{slope}");
     assert_eq!(impacts.slopes.len(), 2 * 4 * 2);
@@ -300,7 +303,7 @@ fn a_known_joint_comes_back_both_ways() {
 #[test]
 fn without_a_there_are_still_loops() {
     let found = run(&Rig::new().without(|c| c.configuration != Structure::A));
-    // the specimens' own T/Δx needs the assembly only
+    // the specimens' T/Δx needs only the assembly
     assert!(found.substructured.is_none() && found.fits.is_empty());
     let contact = found.contact.expect("looked for");
     assert!(contact.impacts.is_some() && contact.direct.is_some());
@@ -338,13 +341,14 @@ fn nothing_measured_is_no_error() {
     assert_eq!((contact.series.ok(), contact.hidden.ok(), contact.change), (None, None, None));
 }
 
-/// Their cells are measured and averaged, and tell the contact's stage more; what is made of the arms' FRFs stays as it was.
+/// The added cells are measured and averaged, and give the contact stage more data; the results
+/// from the arms' FRFs are unchanged.
 #[test]
 fn points_on_a_specimen_change_nothing_of_the_arms() {
     let (plain, whole) = (run(&Rig::new()), run(&Rig::new().with_specimen()));
     let arms = |found: &Findings| {
         let shown: Vec<_> = found.configurations.iter().map(|c| &c.frfs).collect();
-        // not every number is one, and none of those is equal to itself
+        // compare as text, because some numbers are NaN and NaN is not equal to itself
         format!("{:?} {:?} {:?} {shown:?}", found.substructured, found.recommended, found.fits)
     };
     assert!(headline(&whole) && !left_out(&whole), "{:?}", whole.missing);
@@ -355,7 +359,7 @@ fn points_on_a_specimen_change_nothing_of_the_arms() {
     assert_eq!(plain_arms.len(), whole_arms.len());
     let records = |found: &Findings| found.configurations[2].records.len();
     assert_eq!(records(&whole), records(&plain) + 2 * 2);
-    // six impacts have no cell on the specimen, as a plan would not have them either
+    // six impacts have no cell on the specimen; a real plan would not have them either
     let absent = Missing::CellsWithoutHit { configuration: Structure::Ajb, absent: 6, planned: 40 };
     assert!(whole.missing.contains(&absent), "{:?}", whole.missing);
 }

@@ -1,4 +1,5 @@
-//! The shaker's levels: each level's loop with the raw and the corrected force, a loop to look at, the law over amplitude.
+//! The shaker's levels: each level's loop with the raw and the corrected force, an example loop,
+//! the law over amplitude.
 
 use super::cell::ShakerLevel;
 use super::level_stiffness;
@@ -14,17 +15,17 @@ use crate::hysteresis::{
 };
 use crate::results::{Backbone, ShakerLoop, rounded};
 
-/// A sweep's ends belong to the way up and the ramp down, Hz.
+/// Margin at the ends of a sweep, which contain the ramps up and down, Hz.
 const SWEEP_MARGIN_HZ: f64 = 2.0;
 
-/// One level in steady state, analysed.
+/// One steady level with its analysis.
 #[derive(Debug)]
 pub struct Analysed<'a> {
-    /// What was measured.
+    /// The measured level.
     pub level: &'a ShakerLevel,
     /// Its loops with the raw force.
     pub raw: LoopAnalysis,
-    /// With the force corrected, where the static arm was known beforehand.
+    /// With the corrected force, if the static arm was known beforehand.
     pub corrected: Option<LoopAnalysis>,
     /// Its amplitudes.
     pub tones: Option<Tones>,
@@ -33,18 +34,18 @@ pub struct Analysed<'a> {
 /// The loops of one record with a steady excitation, or of one decay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordLoops {
-    /// Of a level of a campaign: its id in the campaign file, and when it was measured.
+    /// For a level of a campaign: its id in the campaign file, and when it was measured.
     pub level: Option<(i64, Moment)>,
     /// With the raw force.
     pub raw: LoopAnalysis,
-    /// With the force corrected by what is known of the static arm.
+    /// With the force corrected for the static arm.
     pub corrected: Option<LoopAnalysis>,
-    /// Of a level of a campaign: the contact's own k_T at it, or why there is none.
+    /// For a level of a campaign: the contact's k_T at it, or why there is none.
     pub own: Option<level_stiffness::Outcome>,
 }
 
-/// Every steady level, analysed with the raw force, and with the corrected one where the static `arm` is known already; and those that
-/// give no loop.
+/// Every steady level, analysed with the raw force, and with the corrected one if the static `arm`
+/// is already known; and those without a loop.
 pub fn analysed<'a>(
     levels: &'a [ShakerLevel],
     arm: Option<&Identified>,
@@ -54,7 +55,7 @@ pub fn analysed<'a>(
         let both = arm.and_then(|arm| analyse_both(&level.record, &arm.correction).ok());
         let loops = match both {
             Some([raw, corrected]) => Ok((raw, Some(corrected))),
-            // a force that cannot be corrected has its raw loops
+            // if the force cannot be corrected, use only the raw loops
             None => analyse(&level.record).map(|raw| (raw, None)),
         };
         match loops {
@@ -67,12 +68,13 @@ pub fn analysed<'a>(
     (found, missing)
 }
 
-/// Amplitudes of the levels whose contact sticks: what the static arm may be identified from.
+/// Amplitudes of the levels at which the contact sticks, from which the static arm can be
+/// identified.
 pub fn stuck(levels: &[Analysed<'_>]) -> Vec<Tones> {
     levels.iter().filter(|l| l.raw.shape == Shape::Stuck).filter_map(|l| l.tones).collect()
 }
 
-/// Δx/T of the sweeps, inside their ends.
+/// Δx/T of the sweeps, without their ends.
 pub fn swept(levels: &[ShakerLevel]) -> Vec<ContactCompliance> {
     let sweeps = levels.iter().filter_map(|level| Some((level, level.level.end_hz?)));
     sweeps
@@ -85,7 +87,8 @@ pub fn swept(levels: &[ShakerLevel]) -> Vec<ContactCompliance> {
         .collect()
 }
 
-/// The loops of every level: raw, and corrected where the static arm is known and gives one; `own` is what each is at the contact.
+/// The loops of every level: raw, and corrected if the static arm is known and the correction gives
+/// a loop; `own` is the k_T of each at the contact.
 pub fn loops(
     levels: Vec<Analysed<'_>>,
     arm: Option<&Identified>,
@@ -105,7 +108,7 @@ pub fn loops(
         .collect()
 }
 
-/// The law through the levels of each frequency and moment at which something slips.
+/// The law fitted to the levels of each frequency and moment at which something slips.
 pub fn backbones(levels: &[Analysed<'_>]) -> Vec<Backbone> {
     let mut usable: Vec<&Analysed<'_>> =
         levels.iter().filter(|one| one.raw.shape != Shape::Elliptical).collect();
@@ -130,7 +133,8 @@ pub fn backbones(levels: &[Analysed<'_>]) -> Vec<Backbone> {
         .collect()
 }
 
-/// Loops of the levels to look at: the middle amplitude of each frequency, one cycle averaged over the record.
+/// Example loops of the levels: the middle amplitude of each frequency, one cycle averaged over the
+/// record.
 pub fn curves(levels: &[Analysed<'_>]) -> Vec<ShakerLoop> {
     let mut frequencies: Vec<f64> = levels.iter().map(|l| l.level.level.frequency_hz).collect();
     frequencies.sort_by(f64::total_cmp);
@@ -160,7 +164,7 @@ fn curve(one: &Analysed<'_>) -> ShakerLoop {
     }
 }
 
-/// Displacements of both specimens over the first cycle, from their middle.
+/// Displacements of both specimens over the first cycle, with their mean removed.
 fn specimens(record: &HysteresisRecord, samples: usize) -> [Vec<f64>; 2] {
     let whole = |x: &[f64]| x[..samples.min(x.len())].to_vec();
     let integrated = |v: &[f64]| {

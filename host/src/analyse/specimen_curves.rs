@@ -1,12 +1,12 @@
-//! The FRFs of both specimens in the assembly, to look at.
+//! The FRFs of both specimens in the assembly, for the report.
 
 use crate::results::{FrfCurve, Role, rounded};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
 use num_complex::Complex;
 
-/// The two specimens' receptances from one impact, their difference, and the load cells' force, for the report; hit and response
-/// count positive along +z, so `sign` is −1 for a hit towards −z.
+/// The two specimens' receptances from one impact, their difference, and the load cells' force; hit
+/// and response are positive along +z, so `sign` is −1 for a hit towards −z.
 pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfCurve; 4] {
     let of = |output: usize, line: usize| sign * average.h1(line, output);
     let receptance = |output: usize| move |line: usize| of(output, line) / average.s(line);
@@ -20,7 +20,7 @@ pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfC
     ]
 }
 
-/// One curve; coherence is that of the output measured, where it is one.
+/// One curve; its coherence is that of the measured output, if it is a measured one.
 fn curve(
     impact: &str,
     average: &CrossSpectra,

@@ -1,4 +1,5 @@
-//! The document of a campaign file: what `jointrig analyse` writes, and what a page shows of it while it is measured.
+//! The document of a campaign file: written by `jointrig analyse`, and shown on a page during the
+//! measurement.
 
 use super::document::document;
 use super::words::missing_sentences;
@@ -8,7 +9,8 @@ use crate::results::Results;
 use crate::structure::Structure;
 use crate::substructuring::Frf;
 
-/// Analyses what the file holds. A simulated rig's truth joins the document when all is found: no estimator can see it.
+/// Analyses the file's contents. The true parameters of a simulated rig are added to the document
+/// after the analysis, so that no estimator can use them.
 ///
 /// # Errors
 /// The file cannot be read, or holds nothing to analyse.
@@ -20,21 +22,21 @@ pub fn analysed(
     written(store, analyse(store, wanted, progress)?)
 }
 
-/// What a file holds, with the FRFs.
+/// Results of a file together with its FRFs.
 #[derive(Debug)]
 pub struct WithFrfs {
-    /// As [`analysed`] gives them.
+    /// As returned by [`analysed`].
     pub results: Results,
-    /// Those of [`Findings::frfs`].
+    /// The FRFs of [`Findings::frfs`].
     pub frfs: Vec<(Structure, Frf)>,
-    /// What is said about records that cannot be used.
+    /// Messages about records that cannot be used.
     pub told: Vec<String>,
 }
 
 /// As [`analysed`], with the FRFs of all pairs.
 ///
 /// # Errors
-/// As of [`analysed`].
+/// As for [`analysed`].
 pub fn analysed_with_frfs(
     store: &Store,
     wanted: Wanted,
@@ -55,10 +57,10 @@ fn written(store: &Store, found: Findings) -> Result<Results, AnalyseError> {
     Ok(results)
 }
 
-/// Whether anything at all was found: nothing must not be taken for a result.
+/// Checks that anything was found at all: an empty document must not be mistaken for a result.
 ///
 /// # Errors
-/// The first reason, in words.
+/// The first reason, as a sentence.
 pub fn must_hold_something(found: &Results) -> Result<(), String> {
     let answered = found.answer.as_ref().is_some_and(|answer| {
         answer.contact.k_t_n_per_m.is_some()

@@ -1,4 +1,5 @@
-//! The raw records of one cell, one over the other: force, and the response along each axis, by time after the trigger.
+//! The raw records of one cell, overlaid: force, and the response along each axis, against time
+//! after the trigger.
 
 use jointrig_protocol::channel::{Quantity, Role as Measures};
 
@@ -8,10 +9,11 @@ use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::record_row::RecordRow;
 
-/// The close view, ms after the trigger: pulse, rebound, and what the structure makes of it at first.
+/// Time range of the close view, ms after the trigger: pulse, rebound, and the first response of
+/// the structure.
 const CLOSE_MS: [f64; 2] = [-1.0, 8.0];
 
-/// A record to be drawn.
+/// A record for plotting.
 #[derive(Debug, Clone)]
 pub struct Shown {
     /// Its number.
@@ -22,18 +24,19 @@ pub struct Shown {
     pub verdict: &'static str,
     /// Sampling rate, Hz.
     pub rate_hz: f64,
-    /// Sample of the trigger.
+    /// Index of the trigger sample.
     pub trigger: usize,
     /// Force, N.
     pub force_n: Vec<f64>,
-    /// What the response measures.
+    /// Quantity of the response.
     pub quantity: Quantity,
     /// The response's channels, SI.
     pub response: Vec<Vec<f64>>,
 }
 
 impl Shown {
-    /// A stored record as that of a cell; none where it holds no samples, or its session lacks the hammer's force or the response.
+    /// Converts a stored record; `None` if it holds no samples, or if its session lacks the
+    /// hammer's force or the response.
     ///
     /// # Errors
     /// The record is damaged, or the file cannot be read.
@@ -60,7 +63,7 @@ impl Shown {
         }))
     }
 
-    /// (name, unit, factor to it, samples) of each row of the figure.
+    /// (name, unit, conversion factor, samples) of each row of the figure.
     fn rows(&self) -> Vec<(&'static str, &'static str, f64, &[f64])> {
         let (unit, factor) = match self.quantity {
             Quantity::Velocity => ("mm/s", 1e3),
@@ -80,7 +83,8 @@ impl Shown {
     }
 }
 
-/// The figure as an SVG document of its own; none without records. Left the pulse, right the whole record.
+/// The figure as a separate SVG document: the pulse on the left, the whole record on the right;
+/// `None` without records.
 pub fn records(title: &str, shown: &[Shown]) -> Option<String> {
     let whole = [
         shown.iter().map(|record| record.milliseconds(0)).fold(f64::INFINITY, f64::min),
@@ -89,7 +93,7 @@ pub fn records(title: &str, shown: &[Shown]) -> Option<String> {
     Some(svg::file(&of_views(title, shown, &[CLOSE_MS, whole])?))
 }
 
-/// The pulse and what the structure makes of it at first; none without records.
+/// The pulse and the first response of the structure; `None` without records.
 pub fn close(title: &str, shown: &[Shown]) -> Option<Figure> {
     of_views(title, shown, &[CLOSE_MS])
 }
@@ -108,7 +112,7 @@ fn of_views(title: &str, shown: &[Shown], views: &[[f64; 2]]) -> Option<Figure> 
             let y = Axis::linear(quantity, unit, span(shown, row, range_ms, factor));
             let mut panel =
                 Panel::new(Axis::linear("time after the trigger", "ms", range_ms), y).high(Height::Low);
-            // kept ones on top: they are what counts
+            // kept records are drawn last, on top, because they are the ones used
             for record in shown.iter().filter(|r| !r.kept).chain(shown.iter().filter(|r| r.kept)) {
                 let (role, name) =
                     if record.kept { (Role::Group1, "kept") } else { (Role::Refused, "refused") };
@@ -141,7 +145,7 @@ fn listed(shown: &[Shown]) -> String {
     told.collect::<Vec<_>>().join("; ")
 }
 
-/// Lowest and highest value of a row within the time shown, with a margin.
+/// Lowest and highest value of a row within the time range shown, with a margin.
 fn span(shown: &[Shown], row: usize, range_ms: [f64; 2], factor: f64) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for record in shown {

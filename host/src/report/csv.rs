@@ -1,10 +1,10 @@
-//! A figure's numbers as a table: one line for each point, in the units of its axes.
+//! Exports a figure's numbers as a table: one line for each point, in the units of its axes.
 
 use super::figure::{Axis, Figure, Mark, Packed, Panel, Shape, six_digits};
 use ::csv::Writer;
 use std::borrow::Cow;
 
-/// The figure as csv (RFC 4180), with one line of names above.
+/// The figure as csv (RFC 4180), with a header line.
 pub fn csv(figure: &Figure) -> String {
     let mut table = Table(Writer::from_writer(Vec::new()));
     table.line(["panel", "curve", "horizontal", "x", "upright", "y", "low", "high"]);
@@ -17,7 +17,7 @@ pub fn csv(figure: &Figure) -> String {
     String::from_utf8(table.0.into_inner().expect("memory takes every byte")).expect("made of text alone")
 }
 
-/// No number: an empty cell.
+/// Not a number: gives an empty cell.
 const NONE: f64 = f64::NAN;
 
 struct Table(Writer<Vec<u8>>);
@@ -27,14 +27,16 @@ impl Table {
         self.0.write_record(cells).expect("memory takes every line, and all have eight cells");
     }
 
-    /// Numbers that stand in `results.json`; what is drawn to help the eye (fits, guides, words) is left out.
+    /// Writes numbers that are contained in `results.json`; visual aids (fits, guides, words) are
+    /// left out.
     fn mark(&mut self, title: &str, panel: &Panel, mark: &Mark) {
         let name = if mark.name.is_empty() { mark.role.name() } else { &mark.name };
         let (title, name) = (guarded(title), guarded(name));
         let labels = [panel.x.label(), panel.y.label()];
         let [x_label, y_label] = [guarded(&labels[0]), guarded(&labels[1])];
         let told = |of: &str, value: f64| if mark.tells(of) { six_digits(value) } else { String::new() };
-        // places of a regular curve are told by their step, those among names by the name
+        // x is written where its origin is known, for regular curves through their step; on axes of
+        // names, the name is written
         let x_told = mark.tells("x") || mark.tells("step") || panel.x.link == "cycle";
         let across = |value: f64| match named(&panel.x, value) {
             None if x_told => six_digits(value),
@@ -98,12 +100,12 @@ impl Table {
     }
 }
 
-/// The name at this place of an axis of names: the nearest, since signs stand beside their names.
+/// The nearest name on an axis of names, because markers are drawn at an offset from their names.
 fn named(axis: &Axis, at: f64) -> Option<&str> {
     axis.names.get(at.round().max(0.0) as usize).map(String::as_str)
 }
 
-/// A name that a spreadsheet would take for a formula is held back by an apostrophe.
+/// Prefixes an apostrophe to text that a spreadsheet would interpret as a formula.
 fn guarded(text: &str) -> Cow<'_, str> {
     if text.starts_with(['=', '+', '-', '@', '\t']) { format!("'{text}").into() } else { text.into() }
 }

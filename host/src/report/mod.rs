@@ -1,7 +1,9 @@
-//! The report: results shown to people. Two files, `results.json` for scripts and `report.html` to read.
+//! The report presents the results in two files: `results.json` for scripts and `report.html` for
+//! reading.
 //!
-//! The page is one self-contained html text: figures are inline SVG, nothing is fetched, it prints. Everything
-//! shown stands in [`Results`]; this room computes no result.
+//! The page is a single self-contained HTML text: figures are inline SVG, nothing is fetched, and
+//! it can be printed. Everything shown is contained in [`Results`]; this module computes no
+//! results.
 
 mod analysed;
 pub mod cell_records;
@@ -28,23 +30,23 @@ use std::path::Path;
 
 /// The file for scripts.
 pub const RESULTS_FILE: &str = "results.json";
-/// The file for people.
+/// The file for reading.
 pub const REPORT_FILE: &str = "report.html";
 
-/// The folder of single figures.
+/// The folder for figures as separate files.
 pub const FIGURES_FOLDER: &str = "figures";
 
-/// Every figure that these results have the data for.
+/// All figures for which these results have the data.
 pub fn all_figures(results: &Results) -> Vec<figure::Figure> {
     figures::all(results)
 }
 
-/// A file format of single figures.
+/// A file format for figures as separate files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// Vectors.
+    /// Vector graphics.
     Svg,
-    /// Pixels, two for each of the drawing's.
+    /// Pixels, two for each pixel of the drawing.
     #[cfg(feature = "png")]
     Png,
     /// Numbers.
@@ -52,7 +54,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// How names of its files end.
+    /// File name extension.
     fn ending(self) -> &'static str {
         match self {
             Format::Svg => "svg",
@@ -63,7 +65,8 @@ impl Format {
     }
 }
 
-/// Where hammer and vibrometer are to go, as the plan called `plan` says; none without any place.
+/// Where hammer and vibrometer are to be placed according to the plan `plan`; `None` without any
+/// position.
 pub fn planned_places(places: &[Place], plan: &str) -> Option<figure::Figure> {
     let figure = figures::geometry(places)?;
     let version = env!("CARGO_PKG_VERSION").into();
@@ -71,11 +74,12 @@ pub fn planned_places(places: &[Place], plan: &str) -> Option<figure::Figure> {
     Some(figure::Figure { number: "", title: "Where hammer and vibrometer go".into(), from, ..figure })
 }
 
-/// Writes `results.json`, `report.html` and the figures in these formats into `folder`, which is made if it is not there. Each file
-/// appears whole or not at all: it is written beside its place and renamed.
+/// Writes `results.json`, `report.html` and the figures in these formats into `folder`, which is
+/// created if it does not exist. Each file is written atomically: under a temporary name, then
+/// renamed.
 ///
 /// # Errors
-/// The folder cannot be made or written.
+/// The folder cannot be created or written.
 pub fn write(results: &Results, folder: &Path, formats: &[Format]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let json = || results.to_json().map_err(io::Error::other);
@@ -90,15 +94,15 @@ pub fn write(results: &Results, folder: &Path, formats: &[Format]) -> io::Result
     write_figures(&figures::all(results), &folder.join(FIGURES_FOLDER), formats)
 }
 
-/// Two campaigns compared, for people.
+/// The comparison of two campaigns, for reading.
 pub const COMPARISON_FILE: &str = "compare.html";
-/// The same for scripts.
+/// The comparison of two campaigns, for scripts.
 pub const COMPARED_FILE: &str = "compare.json";
 
 /// Writes `compare.json` and `compare.html` into `folder`, as [`write`](fn@write) does.
 ///
 /// # Errors
-/// The folder cannot be made or written.
+/// The folder cannot be created or written.
 pub fn write_comparison(compared: &Compared, both: [&Results; 2], folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let mut json = serde_json::to_string(compared).map_err(io::Error::other)?;
@@ -117,12 +121,12 @@ fn write_figures(figures: &[figure::Figure], folder: &Path, formats: &[Format]) 
     Ok(())
 }
 
-/// A figure for a notebook: an SVG in the reader's light or dark.
+/// A figure for a notebook: an SVG that follows the reader's light or dark theme.
 pub fn notebook_figure(figure: &figure::Figure) -> String {
     svg::notebook(figure)
 }
 
-/// A matrix of FRFs over frequency, at most six pairs of it; none without a line above 0 Hz.
+/// A matrix of FRFs over frequency, at most six of its pairs; `None` without a line above 0 Hz.
 pub fn frf_figure(frf: &crate::frf::Frf, title: &str) -> Option<figure::Figure> {
     let version = env!("CARGO_PKG_VERSION").into();
     let from = figure::Source { file: title.into(), version, ..figure::Source::default() };
@@ -143,7 +147,8 @@ pub fn write_figure(figure: &figure::Figure, format: Format, path: &Path) -> io:
     write_whole(path, &content)
 }
 
-/// The labels of an axis' ticks, the empty ones of minor ticks included: for the test that holds the page's twin to them. `length` in px.
+/// The labels of an axis' ticks, including the empty ones of minor ticks: used by the test that
+/// compares them with the page's script. `length` in px.
 pub fn axis_labels(logarithmic: bool, range: [f64; 2], length: f64, upright: bool) -> Vec<String> {
     let scale = if logarithmic {
         scale::Scale::logarithmic(range, [0.0, length])
@@ -154,17 +159,18 @@ pub fn axis_labels(logarithmic: bool, range: [f64; 2], length: f64, upright: boo
     scale.ticks(lie).into_iter().map(|tick| tick.label).collect()
 }
 
-/// Writes a file that has its name only when it is whole.
+/// Writes a file atomically: it gets its name only when it is complete.
 ///
 /// # Errors
-/// It cannot be written; nothing is left of it then, and what had the name before still has it.
+/// It cannot be written; then no partial file is left, and an existing file of that name is
+/// unchanged.
 pub fn write_whole(place: &Path, content: &[u8]) -> io::Result<()> {
     let beside = place.with_added_extension(format!("{}.part", std::process::id()));
     let written = File::create(&beside)
         .and_then(|mut file| file.write_all(content).and_then(|()| file.sync_all()))
         .and_then(|()| fs::rename(&beside, place));
     if written.is_err() {
-        // the first error is the one to report
+        // report the first error and ignore this one
         let _ = fs::remove_file(&beside);
     }
     written
@@ -175,7 +181,7 @@ mod tests {
     use super::*;
     use crate::results::{Source, example_tests as example};
 
-    /// The page as it is read: spaces that hold number and unit together are spaces.
+    /// The page's text, with no-break spaces between number and unit as plain spaces.
     fn read(results: &Results) -> String {
         page(results).replace('\u{a0}', " ").replace('\u{2060}', "")
     }
@@ -236,7 +242,7 @@ mod tests {
     #[test]
     fn the_page_needs_nothing_from_outside_and_stays_small() {
         let html = page(&example::results());
-        // the charts' own script names its author's page, and asks nothing of it
+        // the chart library's script contains its author's URL, but does not access it
         let (markup, _) = html.split_once("<script").expect("a script");
         for outside in ["http:", "https:", "<link", "src=\"", "url(h", "@import", "NaN", "inf\""] {
             assert!(!markup.contains(outside), "`{outside}` on the page");

@@ -1,17 +1,18 @@
-//! A figure in pixels, by resvg, from the same vectors.
+//! Rasterises a figure with resvg, from the same SVG.
 
 use resvg::{tiny_skia, usvg};
 
-/// Pixels for each of the drawing's own, for screens and print.
+/// Pixels per pixel of the drawing, for screens and print.
 const SCALE: f32 = 2.0;
 
-/// Fonts that have every sign of a figure, superscripts too: one without them would get those of another font.
+/// Fonts that contain every character of a figure, including superscripts; otherwise missing ones
+/// would come from another font.
 const FONTS: &str = "\"DejaVu Sans\",\"Segoe UI\",\"Liberation Sans\",Arial,sans-serif";
 
 /// The drawing as a PNG file.
 ///
 /// # Errors
-/// The text is no SVG, or is too large for memory.
+/// The text is not valid SVG, or the image is too large for memory.
 pub fn png(svg: &str) -> Result<Vec<u8>, String> {
     let svg = with_fonts(svg);
     let mut options = usvg::Options::default();
@@ -24,7 +25,7 @@ pub fn png(svg: &str) -> Result<Vec<u8>, String> {
     pixels.encode_png().map_err(|error| error.to_string())
 }
 
-/// The same drawing, whose style sheet names [`FONTS`].
+/// The same drawing, with [`FONTS`] in its style sheet.
 fn with_fonts(svg: &str) -> String {
     let Some(from) = svg.find("font-family:") else { return svg.to_owned() };
     let from = from + "font-family:".len();
@@ -44,7 +45,7 @@ mod tests {
             let text = svg::file(figure);
             let picture = tiny_skia::Pixmap::decode_png(&png(&text).expect(figure.name)).expect(figure.name);
             assert_eq!(picture.width(), (2.0 * svg::WIDTH) as u32, "{}", figure.name);
-            // the paper is white; frame, curves and words are not
+            // the background is white; frame, curves and words are not
             let drawn =
                 picture.pixels().iter().filter(|p| p.red().min(p.green()).min(p.blue()) < 200).count();
             assert!(drawn > 2_000, "{}: {drawn} dark pixels", figure.name);

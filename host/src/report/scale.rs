@@ -1,9 +1,9 @@
-//! Axes: from values to pixels, with ticks at 1, 2 and 5.
+//! Axis scales: from values to pixels, with ticks at multiples of 1, 2 and 5.
 
 use super::figure::{Axis, Spread};
 use crate::report::words::number::decimals;
 
-/// One axis: a range of values on a range of pixels.
+/// Maps the range of an axis to a range of pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     spread: Spread,
@@ -13,17 +13,18 @@ pub struct Scale {
     to: f64,
 }
 
-/// A tick: where, and what is written there.
+/// A tick: its value and label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
     /// The value.
     pub value: f64,
-    /// The text beside it; empty for a minor tick.
+    /// The label; empty for a minor tick.
     pub label: String,
 }
 
 impl Scale {
-    /// An even axis from `range` onto `pixels`. An empty or broken range is widened to something drawable.
+    /// A linear axis from `range` onto `pixels`. An empty or invalid range is widened to one that
+    /// can be drawn.
     pub fn linear(range: [f64; 2], pixels: [f64; 2]) -> Self {
         let [low, high] = drawable(range, Spread::Linear);
         Scale { spread: Spread::Linear, low, high, from: pixels[0], to: pixels[1] }
@@ -35,7 +36,7 @@ impl Scale {
         Scale { spread: Spread::Log, low, high, from: pixels[0], to: pixels[1] }
     }
 
-    /// That of a described axis.
+    /// The scale of an axis description.
     pub fn of(axis: &Axis, pixels: [f64; 2]) -> Self {
         match axis.scale {
             Spread::Linear => Scale::linear(axis.range, pixels),
@@ -48,7 +49,8 @@ impl Scale {
         [self.low, self.high]
     }
 
-    /// Where a value stands, in pixels; values beyond the ends stand outside. `None` for what has no place.
+    /// Position of a value, in pixels; a value outside the range gives a position outside. `None`
+    /// if it has no position (zero or less on a logarithmic axis).
     pub fn place(&self, value: f64) -> Option<f64> {
         let share = match self.spread {
             Spread::Linear => (value - self.low) / (self.high - self.low),
@@ -59,14 +61,15 @@ impl Scale {
         place.is_finite().then_some(place)
     }
 
-    /// Like [`Scale::place`], held at the ends.
+    /// As [`Scale::place`], clamped to the ends.
     pub fn place_within(&self, value: f64) -> f64 {
         let (low, high) = (self.from.min(self.to), self.from.max(self.to));
         self.place(value).map_or(low, |p| p.clamp(low, high))
     }
 
-    /// Ticks with as many labels as stand apart on these pixels, at 1, 2 and 5; those between them have none. The page's twin is
-    /// `page/ticks.js`: a test draws random axes in both.
+    /// Ticks at multiples of 1, 2 and 5, with as many labels as fit on these pixels without
+    /// touching; those in between have no label. `page/ticks.js` does the same; a test compares the
+    /// two on random axes.
     pub fn ticks(&self, lie: Lie) -> Vec<Tick> {
         match self.spread {
             Spread::Linear => self.even_ticks(lie),
@@ -74,7 +77,7 @@ impl Scale {
         }
     }
 
-    /// Ticks at multiples of `step` (for degrees, where 1-2-5 is not the custom).
+    /// Ticks at multiples of `step` (for degrees, where 1-2-5 is not customary).
     pub fn ticks_every(&self, step: f64) -> Vec<Tick> {
         let places = usize::try_from(-exponent(step)).unwrap_or(0);
         let first = (self.low / step - NEAR).ceil();
@@ -155,7 +158,7 @@ impl Scale {
             if !apart {
                 continue;
             }
-            // minor lines only where decades are wide enough to tell them apart
+            // minor lines only if the decades are wide enough
             let minor = (self.high / self.low).log10() < 3.0;
             let all = if minor { places(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 1) } else { places(&[1], 1) };
             return all
@@ -173,7 +176,8 @@ impl Scale {
         self.within_a_decade(lie)
     }
 
-    /// Even steps on a logarithmic axis of less than a decade; labels that would touch the one before are left out.
+    /// Linear steps on a logarithmic axis of less than a decade; labels that would touch the
+    /// previous one are omitted.
     fn within_a_decade(&self, lie: Lie) -> Vec<Tick> {
         let even = Scale { spread: Spread::Linear, ..*self };
         let mut end = f64::NEG_INFINITY;
@@ -191,28 +195,30 @@ impl Scale {
     }
 }
 
-/// How an axis lies: labels beside one another need more room than labels over one another.
+/// Orientation of an axis: labels side by side need more space than labels one above the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lie {
     /// Horizontal.
     Across,
-    /// Upright.
+    /// Vertical.
     Up,
 }
 
-/// Width of a digit at the size of ticks, px.
+/// Width of a digit in tick labels, px.
 const DIGIT: f64 = 7.0;
-/// Between labels beside one another, px.
+/// Distance between labels side by side, px.
 const BESIDE: f64 = 26.0;
-/// From one label to the next above it, px.
+/// Distance between labels one above the other, px.
 const ABOVE: f64 = 30.0;
-/// Labels never come nearer than this, px: taken where wider steps would leave a single one.
+/// Smallest distance between labels one above the other, px; used if larger steps would leave a
+/// single label.
 const TIGHT_ABOVE: f64 = 16.0;
-/// The same beside one another.
+/// The same for labels side by side.
 const TIGHT_BESIDE: f64 = 48.0;
-/// A tick this part of a step beyond the end is still at the end: what rounding does.
+/// A tick beyond the end by less than this fraction of a step still counts as at the end, because
+/// of rounding.
 const NEAR: f64 = 1e-9;
-/// An axis never has more: what is asked for is some dozens at most.
+/// Limit on the number of ticks; a few dozen are needed at most.
 const MOST_TICKS: f64 = 200.0;
 
 impl Lie {
@@ -231,12 +237,12 @@ impl Lie {
     }
 }
 
-/// The decimal exponent: of the digits themselves, so that every machine finds the same.
+/// The decimal exponent, taken from the printed digits so that it is the same on every machine.
 fn exponent(value: f64) -> i32 {
     format!("{value:e}").split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
 
-/// digit · 10^decade, the nearest number to it.
+/// The number closest to digit · 10^decade.
 fn power(digit: u32, decade: i32) -> f64 {
     format!("{digit}e{decade}").parse().unwrap_or(f64::NAN)
 }
@@ -263,8 +269,8 @@ fn superscript(exponent: i32) -> String {
     exponent.to_string().chars().map(|c| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize])).collect()
 }
 
-/// The range that holds the share `keep` of the finite values in the middle, widened by `margin` of itself:
-/// single lines that explode do not flatten the rest.
+/// The range that contains the middle fraction `keep` of the finite values, widened by the fraction
+/// `margin`, so that a few extreme lines do not compress the others.
 pub fn middle_range(values: impl IntoIterator<Item = f64>, keep: f64, margin: f64) -> Option<[f64; 2]> {
     let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);

@@ -1,24 +1,24 @@
-//! Two campaigns against each other: differences with their intervals, and whether they differ.
+//! Comparison of two campaigns: differences with their intervals, and whether they are significant.
 
 use super::Source;
 use crate::contact::Interval;
 use serde::Serialize;
 
-/// Two campaigns against each other.
+/// Comparison of two campaigns.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Compared {
-    /// Version of this shape.
+    /// Version of this format.
     pub version: u32,
-    /// Where each comes from, A first.
+    /// Sources of both campaigns, A first.
     pub sources: [Source; 2],
-    /// Whether the contacts differ: told from k_T, or from what lies between the arms where there is none; null where neither is known in
-    /// both.
+    /// Whether the contacts differ, decided by k_T, or by the stiffness between the arms if there
+    /// is none; null if neither is known in both.
     pub differ: Option<bool>,
     /// The verdict in a sentence.
     pub verdict: String,
-    /// Every quantity that both have.
+    /// All quantities that both have.
     pub differences: Vec<Difference>,
-    /// What only one of them has, in sentences.
+    /// Quantities that only one of them has, in sentences.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
 }
@@ -26,16 +26,16 @@ pub struct Compared {
 /// One quantity of both campaigns, SI.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
-    /// What it is.
+    /// Its name.
     pub quantity: String,
     /// Its unit: `N/m` or `N s/m`.
     pub unit: &'static str,
-    /// Of the first campaign.
+    /// Value in the first campaign.
     pub a: Interval,
-    /// Of the second.
+    /// Value in the second campaign.
     pub b: Interval,
     /// The second minus the first.
     pub b_minus_a: Interval,
-    /// Whether the interval of the difference leaves out zero.
+    /// Whether the interval of the difference excludes zero.
     pub differ: bool,
 }

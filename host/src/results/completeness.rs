@@ -1,4 +1,4 @@
-//! What of the plan was measured: kept and refused hits per configuration.
+//! Progress of the plan: kept and refused hits per configuration.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -10,9 +10,9 @@ pub struct Completeness {
     pub configuration: String,
     /// Cells of the plan.
     pub cells: usize,
-    /// Cells that have all the hits wanted.
+    /// Cells with all planned hits.
     pub cells_complete: usize,
-    /// Hits the plan wants kept.
+    /// Number of hits planned to be kept.
     pub wanted: usize,
     /// Hits kept.
     pub kept: usize,

@@ -1,4 +1,4 @@
-//! Curves kept for the figures: a few FRFs with their coherence.
+//! Curves for the figures: a few FRFs with their coherence.
 
 use crate::substructuring::Band;
 use serde::Serialize;
@@ -19,9 +19,9 @@ pub enum Role {
     Relative,
     /// The load cells' sum T, newton per newton of the hammer.
     Force,
-    /// A point on the arm of A, from the impact that the specimens' curves are from.
+    /// A point on the arm of A, from the same impact as the specimens' curves.
     ArmA,
-    /// A point on the arm of B, from the same.
+    /// A point on the arm of B, from the same impact.
     ArmB,
 }
 
@@ -40,7 +40,7 @@ pub struct FrfCurve {
     pub hits: usize,
     /// First line, Hz.
     pub first_hz: f64,
-    /// Distance of lines, Hz.
+    /// Spacing of the lines, Hz.
     pub step_hz: f64,
     /// Magnitude of the receptance, m/N (of `force`: N/N), line by line.
     pub magnitude_m_per_n: Vec<f64>,
@@ -57,16 +57,17 @@ impl FrfCurve {
     }
 }
 
-/// Over which frequencies the hammer put enough force, per configuration.
+/// The band in which the hammer's force was sufficient, per configuration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UsableBand {
     /// Configuration: `A`, `B` or `AJB`.
     pub configuration: String,
-    /// Where the force's auto-spectrum is within 6 dB of its level at low frequency, Hz.
+    /// Band in which the force's auto-spectrum is within 6 dB of its level at low frequency, Hz.
     pub band_hz: Band,
 }
 
-/// To `digits` significant decimal digits: keeps files small without losing what a figure shows.
+/// Rounds to `digits` significant decimal digits, which keeps files small without visible effect in
+/// a figure.
 pub fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;

@@ -1,4 +1,4 @@
-//! A made-up document with everything in it, for tests of the words and the report.
+//! An artificial document with every part, for tests of the sentences and the report.
 
 use super::*;
 use crate::substructuring::IdmSet;
@@ -133,7 +133,7 @@ fn spectrum() -> JointSpectrum {
     JointSpectrum { frequency_hz, curves }
 }
 
-/// Two amplitudes at three frequencies, before and after.
+/// Two amplitudes at three frequencies, before and after the hammer's cells.
 fn levels() -> Vec<Hysteresis> {
     let mut rows = Vec::new();
     for (f, k, shape) in
@@ -215,7 +215,7 @@ fn reconstruction() -> Reconstruction {
     }
 }
 
-/// Everything at once: the default rig's numbers, a little noise.
+/// All parts together: the default rig's numbers, with a little noise.
 pub fn results() -> Results {
     let names =
         |pairs: &[(&str, &str)]| pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
@@ -372,7 +372,8 @@ pub fn results() -> Results {
     results
 }
 
-/// What only a campaign with all three configurations has: the estimate to quote, the virtual points, the CMIF, hits drawn anew.
+/// Parts that only a campaign with all three configurations has: the estimate to quote, the virtual
+/// points, the CMIF, the bootstrap over hits.
 pub fn add_interface(results: &mut Results) {
     use crate::substructuring::Dof;
     use crate::substructuring::averaged::{DofEstimate, Priors, Replicates};

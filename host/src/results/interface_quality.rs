@@ -1,4 +1,5 @@
-//! What is known of the interface itself: how well the virtual points hold it, and which motions coupling adds.
+//! Quality of the interface: how well the virtual points reproduce it, and which motions coupling
+//! adds.
 
 use crate::substructuring::averaged::{DofEstimate, Replicates};
 use crate::substructuring::{Band, Dof};
@@ -12,23 +13,24 @@ pub struct VirtualPoint {
     pub substructure: String,
     /// Number of interface deformation modes.
     pub idms: usize,
-    /// Which ones.
+    /// The modes.
     pub modes: Vec<Dof>,
     /// Condition number of the sensors' R, rotations scaled by 40 mm.
     pub condition_responses: f64,
     /// Condition number of the impacts' R.
     pub condition_impacts: f64,
-    /// Part of the measured motion that the modes hold, 0…1, mean over the main band (over all lines where it has none).
+    /// Fraction of the measured motion that the modes reproduce, 0…1, mean over the main band (over
+    /// all lines if there are none in it).
     pub overall_sensor: f64,
-    /// Part of the measured force that they hold.
+    /// Fraction of the measured force that they reproduce.
     pub overall_impact: f64,
     /// Specific consistency by channel, 0…1.
     pub sensors: BTreeMap<String, f64>,
     /// Specific consistency by impact, 0…1.
     pub impacts: BTreeMap<String, f64>,
-    /// Part of the lines with a passive driving point, by mode.
+    /// Fraction of the lines with a passive driving point, by mode.
     pub passivity: BTreeMap<Dof, f64>,
-    /// How far Y_ij equals Y_ji, 0…1; null with one mode.
+    /// Agreement between Y_ij and Y_ji, 0…1; null with one mode.
     pub reciprocity: f64,
 }
 
@@ -39,27 +41,28 @@ pub struct InterfaceModes {
     pub frequency_hz: Vec<f64>,
     /// The largest singular values, \[curve\]\[line\], m/N.
     pub singular_values_m_per_n: Vec<Vec<f64>>,
-    /// How much each of x, y, z, rx, ry, rz takes part in each curve, 0…1: mean over the main band (over all lines where it has none).
+    /// Participation of each of x, y, z, rx, ry, rz in each curve, 0…1: mean over the main band
+    /// (over all lines if there are none in it).
     pub participation: Vec<[f64; 6]>,
-    /// Part of the motion added by coupling that 2, 4 and 6 modes explain, 0…1.
+    /// Fraction of the motion added by coupling that 2, 4 and 6 modes explain, 0…1.
     pub explained: BTreeMap<usize, f64>,
     /// Number of modes suggested.
     pub suggested: usize,
-    /// Why.
+    /// Reason for the suggestion.
     pub reason: String,
 }
 
-/// Hits of every interface cell drawn anew, again and again.
+/// Bootstrap: the hits of every interface cell are resampled repeatedly.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bootstrap {
     /// The band, Hz.
     pub band_hz: Band,
-    /// How often.
+    /// Number of replicates.
     pub replicates: usize,
-    /// The same seed gives the same figures.
+    /// Seed of the random numbers; the same seed gives the same figures.
     pub seed: u64,
-    /// What the replicates say: the hits' scatter alone. N/m; N m/rad for rotations.
+    /// Result of the replicates, i.e. the scatter of the hits only. N/m; N m/rad for rotations.
     pub hits: BTreeMap<Dof, Replicates>,
-    /// The recommended estimate with that scatter in place of the propagated noise.
+    /// The recommended estimate with that scatter instead of the propagated noise.
     pub joint: BTreeMap<Dof, DofEstimate>,
 }

@@ -1,4 +1,4 @@
-//! The joint by substructuring: numbers over bands, and the spectra they come from.
+//! The joint by substructuring: values over bands, and the spectra from which they are computed.
 
 use crate::identified::SCATTER_OF_LINES;
 use crate::substructuring::Band;
@@ -6,10 +6,10 @@ use crate::substructuring::{BandStatistic as Statistics, Dof};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Name of T/Δx at the specimens among the methods.
+/// Method name of T/Δx at the specimens.
 pub const DIRECT: &str = "direct";
 
-/// The headline quotes the row of the main band for which this is largest.
+/// Rank of a row: the headline quotes the row of the main band with the largest rank.
 pub fn headline_rank(method: &str, idms: usize) -> (bool, bool, usize) {
     (method == "internal", method == "internal-printed", idms)
 }
@@ -21,7 +21,7 @@ pub struct Joint {
     pub method: String,
     /// Interface deformation modes of each virtual point: 2, 4, 6, or another choice.
     pub idms: usize,
-    /// Which ones; none where no virtual point is used.
+    /// The modes; empty if no virtual point is used.
     pub modes: Vec<Dof>,
     /// The band, ends included, Hz.
     pub band_hz: Band,
@@ -44,16 +44,17 @@ pub struct Joint {
     /// Damping between them, in the same units times seconds.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub coupling_damping_si: BTreeMap<String, Statistics>,
-    /// What the FRFs' noise alone moves the stiffness of one line by, N/m by direction: standard deviation by linear propagation through
-    /// virtual points and method, median over the band. None where a variance is not known.
+    /// Standard deviation of the stiffness of one line due to the FRFs' noise alone, N/m by
+    /// direction: by linear propagation through virtual points and method, median over the band.
+    /// Absent where a variance is not known.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub noise_n_per_m: BTreeMap<String, f64>,
     /// Lines of the band that were used.
     pub lines: usize,
-    /// Of `fit`: how well the model describes the data.
+    /// For `fit`: how well the model describes the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub goodness: Option<Goodness>,
-    /// What a reader must know before using these numbers.
+    /// Warnings that a reader must know before using these numbers.
     pub warnings: Vec<String>,
 }
 
@@ -63,8 +64,9 @@ impl Joint {
         self.stiffness_n_per_m.get("z")
     }
 
-    /// Whether the sliding stiffness is a number worth showing alone: the lines neither scatter nor are moved by noise by more than
-    /// the value, and it is positive.
+    /// Whether the sliding stiffness is positive and reliable enough to be quoted alone: the
+    /// scatter of its lines is within `SCATTER_OF_LINES` times the mean, and their noise within
+    /// the mean.
     pub fn identified(&self) -> bool {
         let noise = self.noise_n_per_m.get("z").copied().unwrap_or(0.0);
         self.sliding_stiffness()
@@ -75,11 +77,12 @@ impl Joint {
 /// How well a model with K and C describes all cells.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Goodness {
-    /// χ² per degree of freedom; some 0.8 to 1 where model, noise and assumed errors of geometry describe the data.
+    /// χ² per degree of freedom; about 0.8 to 1 if model, noise and assumed geometry errors
+    /// describe the data.
     pub chi_square_per_dof: f64,
-    /// The largest error of geometry that the fit believes in, in assumed standard deviations.
+    /// The largest geometry error in the fit, in assumed standard deviations.
     pub largest_error: f64,
-    /// Whether the search came to rest.
+    /// Whether the search converged.
     pub settled: bool,
 }
 
@@ -90,7 +93,7 @@ pub struct Refusal {
     pub method: String,
     /// Interface deformation modes of each virtual point.
     pub idms: usize,
-    /// The reason, as the method gave it.
+    /// The reason given by the method.
     pub reason: String,
 }
 
@@ -112,11 +115,12 @@ pub struct SpectrumCurve {
     pub idms: usize,
     /// Direction: `x`, `y` or `z`.
     pub dof: String,
-    /// Re Z, N/m; null where the line gave none.
+    /// Re Z, N/m; null if there is no value for the line.
     pub stiffness_n_per_m: Vec<Option<f64>>,
-    /// Standard deviation of the stiffness from the FRFs' noise alone, N/m; empty where their variance is not known.
+    /// Standard deviation of the stiffness from the FRFs' noise alone, N/m; empty where their
+    /// variance is not known.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stiffness_noise_n_per_m: Vec<Option<f64>>,
-    /// Damping, N s/m; null where the line gave none.
+    /// Damping, N s/m; null if there is no value for the line.
     pub damping_n_s_per_m: Vec<Option<f64>>,
 }

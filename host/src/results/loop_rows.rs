@@ -1,4 +1,4 @@
-//! The contact by hysteresis loops: numbers per kind of excitation, and one loop to look at.
+//! The contact by hysteresis loops: values per type of excitation, and one example loop.
 
 use crate::contact::{Interval, Shares};
 use crate::hysteresis::backbone::Law;
@@ -6,54 +6,59 @@ use crate::hysteresis::impact::DecayCycle;
 use crate::hysteresis::{Kind as Excitation, LoopFinding, OverCycles, Shape, ShapeEvidence};
 use serde::Serialize;
 
-/// Which force the loop was drawn with.
+/// The force used for the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Force {
-    /// The sum of the load cells as it is.
+    /// The uncorrected sum of the load cells.
     Raw,
     /// Corrected for the static arm's inertia and the parallel path to ground.
     Corrected,
 }
 
-/// Loops of one kind, together.
+/// Results of loops of one type.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Hysteresis {
-    /// Which force.
+    /// The force used.
     pub force: Force,
-    /// What moved the contact.
+    /// The excitation of the contact.
     pub kind: Excitation,
     /// Frequency of the excitation (shaker) or of the cycle (impact), Hz.
     pub frequency_hz: Option<f64>,
     /// Half the swing of Δx, m (mean over cycles).
     pub amplitude_m: Option<f64>,
-    /// The shape that most cycles have.
+    /// The most frequent shape of the cycles.
     pub shape: Shape,
-    /// k_T, N/m. Of a record whose signals are said to be those of the contact: slope of the stick part. In a campaign, where they are those of
-    /// spots beside it and of load cells behind an arm: of a steady level whose force and Δx at the contact are known from the hits, with the
-    /// interval of all that it rests on (`std` is the scatter over stretches of its record); null otherwise.
+    /// k_T, N/m. For a record whose signals are declared to be those of the contact: slope of the
+    /// stick part. In a campaign the signals are those of points near the contact and of load cells
+    /// behind an arm; there it is given for a steady level whose force and Δx at the contact are
+    /// known from the hits, with an interval that includes all contributions (`std` is the scatter
+    /// over stretches of its record). Null otherwise.
     pub k_t_n_per_m: Option<OverCycles>,
-    /// c_T beside it in a campaign, N s/m.
+    /// The corresponding c_T in a campaign, N s/m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub c_t_n_s_per_m: Option<Interval>,
-    /// Relative standard deviation of this k_T by what it comes from.
+    /// Relative standard deviation of this k_T by cause.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub k_t_budget: Option<Shares>,
-    /// Of a level of a campaign: what k_T rests on, or why there is none.
+    /// For a level of a campaign: the data on which k_T is based, or why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub k_t_why: Option<String>,
-    /// The same slope in a campaign, N/m: between the spots, with whatever else lies there; null where the loop has none.
+    /// The corresponding slope in a campaign, N/m: between the measured points, including
+    /// everything else between them; null if the loop has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slope_between_spots_n_per_m: Option<OverCycles>,
-    /// The part of the force's swing after each reversal in which it was read; only where something slips.
+    /// The part of the force's swing after each reversal in which it was fitted; only if something
+    /// slips.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stick_part: Option<[f64; 2]>,
     /// Slope of T on Δx over the whole loop, N/m.
     pub k_eq_n_per_m: Option<OverCycles>,
-    /// Peak secant of the averaged loop, N/m: another quantity beside a hidden resonance, under its own name.
+    /// Peak secant of the averaged loop, N/m. Near a hidden resonance it differs from the slopes,
+    /// so it has its own name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub k_secant_n_per_m: Option<f64>,
-    /// Magnitude of the ratio of fundamentals T₁/Δx₁, N/m: as the secant.
+    /// Magnitude of the ratio of fundamentals T₁/Δx₁, N/m; the remark on the secant applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub k_fundamental_n_per_m: Option<f64>,
     /// Area of the closed loop, J.
@@ -61,11 +66,11 @@ pub struct Hysteresis {
     /// Friction limit μN from the plateau's median, N; only in gross slip.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_limit_n: Option<f64>,
-    /// Friction limit over normal load; null where the contact did not slip or the load is not known.
+    /// Friction limit over normal load; null if the contact did not slip or the load is not known.
     pub friction_coefficient: Option<f64>,
-    /// Phase by which Δx lags T, degrees; of impacts over the first cycle, mean over hits.
+    /// Phase by which Δx lags T, degrees; for impacts over the first cycle, mean over hits.
     pub phase_deg: Option<f64>,
-    /// What the shape was told from.
+    /// Evidence for the shape.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape_evidence: Option<ShapeEvidence>,
     /// Every cycle of one record's decay.
@@ -83,16 +88,17 @@ pub struct Hysteresis {
     /// Ids of the records used, as closed ranges.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<[i64; 2]>,
-    /// What is wrong with the loops or was put right, with its measure.
+    /// Faults of the loops and corrections made, each with its magnitude.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<LoopFinding>,
-    /// What a reader must know before using these numbers.
+    /// Warnings that a reader must know before using these numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
 
 impl Hysteresis {
-    /// Slope of the stick part, whatever it may be called. A level's k_T is none: it is not read off the loop that the row is about.
+    /// Slope of the stick part, under either name. The k_T of a level is excluded: it is not read
+    /// from the loop of this row.
     pub fn stick_slope(&self) -> Option<OverCycles> {
         let read_off = self.k_t_n_per_m.filter(|_| self.k_t_budget.is_none());
         self.slope_between_spots_n_per_m.or(read_off)
@@ -104,14 +110,16 @@ impl Hysteresis {
         Some(Interval { mean: k.mean, ci95: k.ci95? })
     }
 
-    /// In a campaign no slope of a loop is k_T.
+    /// Moves the stick slope to the slope between the measured points, since in a campaign the
+    /// slope of a loop is never k_T.
     #[must_use]
     pub fn between_spots(self) -> Self {
         Hysteresis { k_t_n_per_m: None, slope_between_spots_n_per_m: self.stick_slope(), ..self }
     }
 }
 
-/// How a slipping contact goes with amplitude: the law through the shaker's levels of one frequency, raw force.
+/// Dependence of a slipping contact on amplitude: the law fitted to the shaker's levels of one
+/// frequency, raw force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Backbone {
     /// Frequency of the levels, Hz.
@@ -125,10 +133,10 @@ pub struct Backbone {
     pub law: Law,
 }
 
-/// One cycle of the decay over all hits that count.
+/// One cycle of the decay over all hits used.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DecayStep {
-    /// Which cycle, from 1.
+    /// Number of the cycle, from 1.
     pub cycle: usize,
     /// Least-squares slope of T on Δx over it, N/m; `cycles` counts the hits.
     pub k_eq_n_per_m: OverCycles,
@@ -138,10 +146,10 @@ pub struct DecayStep {
     pub amplitude_m: f64,
 }
 
-/// One cycle, sample by sample: what the loop figure shows.
+/// The samples of the decay for the loop figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoopCurve {
-    /// The record it is from.
+    /// The record.
     pub record: i64,
     /// The impact's name.
     pub impact: String,
@@ -157,13 +165,13 @@ pub struct LoopCurve {
     pub force_n: Vec<f64>,
     /// Range of samples that is the first cycle.
     pub cycle: [usize; 2],
-    /// Ranges of samples of the first cycle and the next ones, as far as they are shown.
+    /// Ranges of samples of the first cycle and the following ones that are shown.
     pub cycles: Vec<[usize; 2]>,
     /// The fitted slope, N/m.
     pub slope_n_per_m: f64,
 }
 
-/// The slope that one impact gave.
+/// The slope from one impact.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImpactSlope {
     /// The record.
@@ -187,12 +195,12 @@ pub struct ShakerLoop {
     pub shape: Shape,
     /// Least-squares slope over the whole loop, N/m.
     pub slope_n_per_m: f64,
-    /// Δx over one cycle, equidistant in time, m.
+    /// Δx over one cycle, equally spaced in time, m.
     pub displacement_m: Vec<f64>,
-    /// T of the same points, N.
+    /// T at the same points, N.
     pub force_n: Vec<f64>,
     /// Displacement of specimen A over the record's first cycle, m.
     pub displacement_a_m: Vec<f64>,
-    /// Displacement of specimen B over the same, m.
+    /// Displacement of specimen B over the same cycle, m.
     pub displacement_b_m: Vec<f64>,
 }

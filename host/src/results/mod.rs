@@ -1,8 +1,9 @@
-//! Results: one document with everything that was found, and what it was found from.
+//! Results: one document with everything that was found, and its provenance.
 //!
-//! [`Results`] is `results.json`, field for field, with SI units in the names: data, and nothing that computes.
-//! [`crate::report::document()`] makes it of what an analysis found; the report and the terminal show it and add
-//! nothing. A value that is not known is null, never NaN. Every document carries its [`Source`]: file, record ids, settings, version.
+//! [`Results`] is `results.json`, field for field, with SI units in the names. It holds data only
+//! and computes nothing. [`crate::report::document()`] builds it from the findings of an analysis;
+//! the report and the terminal show it and add nothing. A value that is not known is null, never
+//! NaN. Every document contains its [`Source`]: file, record ids, settings, version.
 
 mod answer;
 mod check;
@@ -42,102 +43,103 @@ pub use source::{BESIDE_THE_CONTACT, Calibrated, RECORD, Software, Source, range
 use crate::substructuring::Band;
 use serde::Serialize;
 
-/// The shape's version: 1.
+/// Version of the format: 1.
 pub const VERSION: u32 = 1;
 
-/// The band the headline is read from (the paper's Table 2).
+/// The band over which the headline is computed (the paper's Table 2).
 pub const MAIN_BAND: Band = Band { low_hz: 300.0, high_hz: 600.0 };
 
-/// All that was found. The first six fields are the contract that scripts rely on; the others are there for
-/// the report and may grow.
+/// All results. Scripts may rely on the first six fields; the others serve the report and may
+/// change.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Results {
-    /// Version of this shape.
+    /// Version of this format.
     pub version: u32,
-    /// Where it comes from.
+    /// Provenance.
     pub source: Source,
-    /// What the campaign was measured for; absent where no campaign was analysed.
+    /// The result for which the campaign was measured; absent if no campaign was analysed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub answer: Option<Answer>,
     /// The joint by substructuring: method × IDM set × band.
     pub joint: Vec<Joint>,
-    /// The estimates to quote, each with its interval, by band; needs six motions of both virtual points in the assembly.
+    /// The estimates to quote, each with its interval, by band; they need six motions of both
+    /// virtual points in the assembly.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub recommended: Vec<Averaged>,
-    /// The same by drawing hits anew, where it was asked for.
+    /// The same estimates by bootstrap over hits, if it was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap: Option<Bootstrap>,
     /// Quality of the virtual points.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub virtual_points: Vec<VirtualPoint>,
-    /// Which motions coupling adds, and the set of modes that suggests.
+    /// The motions added by coupling, and the set of modes that they suggest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interface_modes: Option<InterfaceModes>,
-    /// The same line by line; absent where nothing was identified.
+    /// The joint line by line; absent if nothing was identified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint_spectrum: Option<JointSpectrum>,
     /// The contact by loops.
     pub hysteresis: Vec<Hysteresis>,
-    /// Whether the numbers may be believed.
+    /// Whether the numbers are credible.
     pub checks: Vec<Check>,
-    /// Every kind of stiffness that was found along the sliding direction, with what it is.
+    /// Every type of stiffness that was found along the sliding direction, with its meaning.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub side_by_side: Vec<SideBySide>,
     /// Methods that were refused, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refused: Vec<Refusal>,
-    /// What the analysis had to do without, in sentences.
+    /// Data that were missing in the analysis, in sentences.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
     /// Kept and refused hits per configuration.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub completeness: Vec<Completeness>,
-    /// Where hammer and vibrometer went.
+    /// Positions of hammer and vibrometer.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub geometry: Vec<Place>,
-    /// Every cell: what was kept, and how well it was heard.
+    /// Every cell: hits kept, and its data quality.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cells: Option<Cells>,
-    /// Every firing of the hammer.
+    /// All firings of the hammer.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hits: Vec<HitRow>,
-    /// One FRF of the assembly against its noise.
+    /// One FRF of the assembly compared with its noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_floor: Option<NoiseFloor>,
-    /// A few FRFs to look at.
+    /// A few example FRFs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frfs: Vec<FrfCurve>,
-    /// Where the hammer's force reaches.
+    /// The bands excited by the hammer.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub usable_bands: Vec<UsableBand>,
-    /// One loop to look at.
+    /// One example loop.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub example_loop: Option<LoopCurve>,
-    /// What the corrected force was corrected by.
+    /// The parameters of the force correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub static_arm: Option<Identified>,
-    /// A loop of the shaker at each frequency.
+    /// One loop of the shaker at each frequency.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shaker_loops: Vec<ShakerLoop>,
-    /// Where the contact slips: how it goes with amplitude, at each frequency with enough levels.
+    /// For a slipping contact: its dependence on amplitude, at each frequency with enough levels.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub backbones: Vec<Backbone>,
-    /// The specimens' decay put together from two sinusoids.
+    /// The specimens' decay reconstructed from two sinusoids.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reconstruction: Option<Reconstruction>,
-    /// The slope of every impact that counts.
+    /// The slope of every impact that is used.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub impact_slopes: Vec<ImpactSlope>,
 }
 
 impl Results {
-    /// An empty document about `source`.
+    /// An empty document with this `source`.
     pub fn new(source: Source) -> Self {
         Results { version: VERSION, source, ..Results::default() }
     }
 
-    /// The substructuring result that the headline quotes: `internal` with the most IDMs over the main band,
-    /// or the nearest thing to it that could be identified.
+    /// The substructuring result that the headline quotes: `internal` with the most IDMs over the
+    /// main band, or the closest alternative that could be identified.
     pub fn headline_joint(&self) -> Option<&Joint> {
         self.joint
             .iter()
@@ -145,12 +147,13 @@ impl Results {
             .max_by_key(|j| headline_rank(&j.method, j.idms))
     }
 
-    /// The estimate to quote over the main band, if it was made; whether it identified a degree of freedom is said there.
+    /// The estimate to quote over the main band, if there is one; it states which degrees of
+    /// freedom are identified.
     pub fn quoted(&self) -> Option<&Averaged> {
         self.recommended.iter().find(|r| r.band_hz == MAIN_BAND)
     }
 
-    /// The loops of the impacts, drawn with the raw force.
+    /// The loops of the impacts with the raw force.
     pub fn impact_loops(&self) -> Option<&Hysteresis> {
         self.hysteresis.iter().find(|h| h.kind == Excitation::Impact && h.force == Force::Raw)
     }

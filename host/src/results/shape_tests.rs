@@ -1,4 +1,4 @@
-//! The shape of `results.json`, field by field as scripts read it.
+//! The format of `results.json`, field by field as scripts read it.
 
 use super::*;
 use serde_json::Value;
@@ -23,7 +23,7 @@ fn the_document_has_its_parts() {
     for part in ["joint", "hysteresis", "checks"] {
         assert!(v[part].is_array(), "{part}");
     }
-    // also when there is nothing in them
+    // also if they are empty
     let empty: Value = serde_json::to_value(Results::new(Source::default())).expect("serialises");
     for part in ["joint", "hysteresis", "checks"] {
         assert!(empty[part].is_array(), "{part}");
@@ -55,7 +55,7 @@ fn a_loop_has_its_fields_and_null_for_the_unknown() {
         for quantity in ["k_eq_n_per_m", "energy_j"] {
             numbers(&row[quantity], &["mean", "std", "cycles"]);
         }
-        // a resonance hides in the example: no impact gives k_T
+        // the example has a hidden resonance, so no impact gives k_T
         assert!(row.get("k_t_n_per_m").is_some_and(Value::is_null));
         assert!(row.get("friction_coefficient").is_some_and(Value::is_null));
     }

@@ -1,39 +1,41 @@
-//! Where a result comes from: file, records, settings, software, link.
+//! Provenance of a result: file, records, settings, software, link.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// [`Source::kind`] of a time record that was analysed by itself.
+/// [`Source::kind`] of a single time record.
 pub const RECORD: &str = "record";
 
-/// The setting of a [`RECORD`] that says that its signals are not the contact's own: the slope of its loops is that of whatever
-/// lies between the spots.
+/// The setting of a [`RECORD`] which states that its signals are not those of the contact itself:
+/// the slope of its loops then includes everything between the measured points.
 pub const BESIDE_THE_CONTACT: &str = "measured";
 
 /// Provenance: enough to compute the same result again from the campaign file alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Source {
-    /// The file analysed (its name, not the folder it happened to lie in).
+    /// The file analysed (its name without the folder).
     pub file: String,
     /// What was analysed: `campaign`, `frf` or `record`.
     pub kind: String,
     /// Whether the device was simulated.
     pub simulated: bool,
-    /// The software that computed this.
+    /// The software that computed the results.
     pub software: Software,
-    /// When the campaign was begun, as its file says, RFC 3339.
+    /// When the campaign was started according to its file, RFC 3339.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub started: Option<String>,
-    /// The device as it named itself: name, firmware, schema.
+    /// The device's self-description: name, firmware, schema.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub device: BTreeMap<String, String>,
-    /// Calibrations that were entered beside what device and plan say, in that order; the last one of a channel counts.
+    /// Calibrations entered in addition to those of device and plan, in the order of entry; the
+    /// last one of a channel applies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub calibrations: Vec<Calibrated>,
-    /// What told that the structure was another one than before, each time that it was accepted.
+    /// Evidence of each change of structure that was accepted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub structure_changes: Vec<String>,
-    /// The specimen's temperature as the controller measured it: least, mean and largest over all sessions, °C.
+    /// The specimen's temperature measured by the controller: minimum, mean and maximum over all
+    /// sessions, °C.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<[f64; 3]>,
     /// Settings of the analysis, by name with unit: windows, lines, virtual points.
@@ -47,24 +49,24 @@ pub struct Source {
     pub link: BTreeMap<String, u64>,
 }
 
-/// A channel that was calibrated otherwise than it had been.
+/// A change of a channel's calibration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibrated {
     /// When it was entered, RFC 3339.
     pub utc: String,
-    /// The first session for which it counts.
+    /// The first session to which it applies.
     pub from_session: i64,
     /// The channel.
     pub channel: String,
-    /// The unit of what it measures.
+    /// The unit of the measured quantity.
     pub unit: String,
-    /// Sensitivity before and since then, V per unit, with the sign.
+    /// Sensitivity before and after, V per unit, with the sign.
     pub sensitivity_v: [f64; 2],
-    /// Delay before and since then, s.
+    /// Delay before and after, s.
     pub delay_s: [f64; 2],
     /// Relative standard uncertainty of the sensitivity.
     pub uncertainty: Option<f64>,
-    /// The sensor: model, serial number, date of calibration, as far as they are stated.
+    /// The sensor: model, serial number, date of calibration, if stated.
     pub sensor: Vec<String>,
     /// Why it was entered.
     pub reason: String,
@@ -80,7 +82,7 @@ pub struct Software {
 }
 
 impl Default for Software {
-    /// This program.
+    /// Describes this program.
     fn default() -> Self {
         Software { name: "jointrig".into(), version: env!("CARGO_PKG_VERSION").into() }
     }

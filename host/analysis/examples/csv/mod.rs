@@ -1,18 +1,19 @@
-//! The examples' data: FRFs as (frequency, output, input, real, imaginary part), one value in each row.
+//! Reads the examples' data: FRFs as (frequency, output, input, real, imaginary part), one value
+//! per row.
 
 use jointrig_analysis::substructuring::{Frf, MotionQuantity};
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
 use std::path::Path;
 
-/// The rows of a file in `examples/data`, without its first line.
+/// The rows of a file in `examples/data`, without its header line.
 pub fn rows(file: &str) -> Result<Vec<Vec<String>>, Box<dyn Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data").join(file);
     let text = std::fs::read_to_string(path)?;
     Ok(text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect())
 }
 
-/// Mobilities under an exponential window of 2.3 1/s.
+/// Mobilities measured with an exponential window of 2.3 1/s.
 #[allow(dead_code, reason = "not every example reads FRFs")]
 pub fn frf(file: &str) -> Result<Frf, Box<dyn Error>> {
     let rows = rows(file)?;

@@ -1,4 +1,4 @@
-//! What a matrix of FRFs may hold.
+//! Checks of the values in an FRF matrix.
 
 use super::error::FrfError;
 use super::matrix::Frf;
@@ -33,7 +33,7 @@ impl Frf {
     pub fn check_variance(&self) -> Result<(), FrfError> {
         for (own, &frequency_hz) in self.variance().into_iter().flatten().zip(self.frequency_hz()) {
             let Some(at) = own.iter().position(|variance| *variance < 0.0) else { continue };
-            // nalgebra keeps columns together
+            // nalgebra stores columns contiguously
             let (row, column) = (at % own.nrows(), at / own.nrows());
             let (output, input) = (self.outputs()[row].clone(), self.inputs()[column].clone());
             return Err(FrfError::NegativeVariance { output, input, frequency_hz, variance: own[at] });
@@ -41,9 +41,9 @@ impl Frf {
         Ok(())
     }
 
-    /// Refuses a coherence outside 0 to 1, naming the first place. One that is out by at most
-    /// [`COHERENCE_ROUNDING`] was rounded: it is set to the end of the range, and the second value
-    /// says how many were.
+    /// Refuses a coherence outside 0 to 1, naming the first place. A value outside by at most
+    /// [`COHERENCE_ROUNDING`] is attributed to rounding and set to the end of the range; the second
+    /// return value is the number of such corrections.
     ///
     /// # Errors
     /// [`FrfError::Coherence`].
@@ -55,9 +55,9 @@ impl Frf {
             for (at, coherence) in own.iter_mut().enumerate() {
                 let clipped = coherence.clamp(0.0, 1.0);
                 let beyond = (*coherence - clipped).abs();
-                // NaN where it is not known compares as neither
+                // NaN (unknown) is neither above nor below
                 if beyond > COHERENCE_ROUNDING {
-                    // nalgebra keeps columns together
+                    // nalgebra stores columns contiguously
                     let (output, input) =
                         (self.outputs()[at % rows].clone(), self.inputs()[at / rows].clone());
                     return Err(FrfError::Coherence { output, input, frequency_hz, coherence: *coherence });
@@ -73,8 +73,8 @@ impl Frf {
     }
 }
 
-/// By how much a coherence may be outside 0 to 1 for its rounding: sums in single precision and five
-/// printed digits give less.
+/// Excess of a coherence beyond 0 to 1 that is attributed to rounding: sums in single precision and
+/// five printed digits give less.
 pub const COHERENCE_ROUNDING: f64 = 1e-5;
 
 #[cfg(test)]

@@ -1,34 +1,34 @@
-//! Lines that several sets of FRFs share, although their files print them with different digits or
-//! cover different bands.
+//! Finds the lines that several sets of FRFs share, although their files print them with different
+//! digits or cover different bands.
 //!
-//! A universal file prints start and step of its lines, or every line, with six digits. Two files of
-//! the same lines then differ by some millionths of a frequency, and that is no other line. FRFs that
-//! overlap in part share the lines of the overlap.
+//! A universal file prints start and step of its lines, or every line, with six digits. Two files
+//! of the same lines may then differ by some millionths of a frequency; such lines count as equal.
+//! FRFs whose bands overlap partly share the lines of the overlap.
 
 use super::matrix::Frf;
 use crate::structure::{Abc, Structure};
 
-/// Frequencies that differ by at most this part are one line: start, step and line are printed with
-/// six digits or more, each rounded by at most 5e-6 of its value, in either file.
+/// Frequencies that differ by at most this fraction are the same line: start, step and line are
+/// printed with six digits or more, each rounded by at most 5e-6 of its value, in either file.
 pub const PRINTED: f64 = 1e-5;
 
-/// Frequencies on either side of this part of the distance to the next line are two lines, whatever
-/// was printed.
+/// Frequencies that differ by more than this fraction of the distance to the next line are
+/// different lines, regardless of the printed digits.
 const OF_SPACING: f64 = 0.1;
 
-/// Two axes that are not of one grid.
+/// Two frequency axes that do not belong to one grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherLines {
-    /// Of the first axis, Hz.
+    /// Line of the first axis, Hz.
     pub one_hz: f64,
-    /// Of the second axis, Hz: the line nearest to it that is another one.
+    /// Line of the second axis, Hz: the nearest line, which differs from it.
     pub other_hz: f64,
 }
 
-/// Places (in the first, in the second) of the lines that two rising axes share, where `tolerance`
-/// gives how far apart two places may be for what was printed. Where both cover a band, all lines of
-/// at least one of the two must be shared: a grid of 1 Hz and one of 2 Hz share every second line,
-/// grids of 19 and 20 Hz are two grids.
+/// Pairs of indices (in the first, in the second) of the lines that two rising axes share.
+/// `tolerance` returns how far apart two lines may be because of printed digits. In the band that
+/// both cover, all lines of at least one of the two must be shared: a grid of 1 Hz and one of 2 Hz
+/// share every second line, grids of 19 and 20 Hz do not match.
 ///
 /// # Errors
 /// [`OtherLines`] with the first lines that differ.
@@ -46,7 +46,7 @@ pub fn shared(
             pairs.push((i, j));
             (i, j) = (i + 1, j + 1);
         } else if f < g {
-            // before the second axis begins it cannot have this line
+            // a line before the start of the second axis cannot be shared and is no mismatch
             of_one = of_one.or(apart.filter(|_| j > 0));
             i += 1;
         } else {
@@ -70,7 +70,7 @@ fn spacing(axis: &[f64], line: usize) -> f64 {
     to(line.checked_sub(1).and_then(|before| axis.get(before))).min(to(axis.get(line + 1)))
 }
 
-/// Whether two axes are the same but for what six printed digits leave open.
+/// Whether two axes are equal within the rounding of six printed digits.
 ///
 /// # Errors
 /// [`OtherLines`] with the first lines that differ.
@@ -85,7 +85,7 @@ pub fn same(one: &[f64], other: &[f64]) -> Result<(), OtherLines> {
     Err(OtherLines { one_hz: at(one), other_hz: at(other) })
 }
 
-/// What was left of FRFs that are not on the same lines.
+/// The common lines of FRFs whose lines are not identical.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommonLines {
     /// Lines that all three have.
@@ -94,15 +94,16 @@ pub struct CommonLines {
     pub low_hz: f64,
     /// The last of them, Hz.
     pub high_hz: f64,
-    /// Lines that each had.
+    /// Number of lines that each had.
     pub of: Abc<usize>,
 }
 
-/// Leaves FRFs of A, B and the assembly with the lines that all three have, and says what was left
-/// where that is less than there was. Where they are on other lines, nothing is changed.
+/// Restricts the FRFs of A, B and the assembly to the lines that all three share, and returns those
+/// lines if any were removed. On an error, nothing is changed.
 ///
 /// # Errors
-/// The structure whose lines are not those of A, and the first that differ (A's, then its own).
+/// The structure whose lines do not match those of A, and the first pair that differs (A's line,
+/// then its own). If no line is common to all three, the first lines of B and of the assembly.
 pub fn keep_common_lines(files: &mut [Frf; 3]) -> Result<Option<CommonLines>, (Structure, OtherLines)> {
     let [a, b, ajb] = files.each_ref().map(super::matrix::Frf::frequency_hz);
     let with_a = |other: &[f64], structure: Structure| {
@@ -192,7 +193,8 @@ mod tests {
             );
             assert!(same(&a, &wrong).is_err());
         }
-        // lines that are closer than six digits can tell are compared as finely as they are
+        // lines closer together than six digits can resolve are compared within a fraction of their
+        // spacing
         assert!(shared(&grid(8000.0, 0.01, 9), &grid(8000.005, 0.01, 9), |_, _| 0.08).is_err());
     }
 }

@@ -1,12 +1,12 @@
-//! Why FRFs cannot be used.
+//! Errors of FRFs.
 
 use super::quantity::MotionQuantity;
 
-/// Why FRFs cannot be used.
+/// Reasons why FRFs cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrfError {
-    /// Axis, names and matrices disagree in number.
+    /// The sizes of axis, names and matrices do not match.
     #[error(
         "line {line}: the FRF matrix is {rows} × {columns}, but there are {outputs} output and {inputs} input names"
     )]
@@ -22,7 +22,7 @@ pub enum FrfError {
         /// Input names given.
         inputs: usize,
     },
-    /// There are not as many matrices as frequencies.
+    /// The number of matrices differs from that of frequencies.
     #[error("{frequencies} frequencies but {matrices} FRF matrices: one matrix per line is needed")]
     LineCount {
         /// Frequencies given.
@@ -30,7 +30,7 @@ pub enum FrfError {
         /// Matrices given.
         matrices: usize,
     },
-    /// Variance or coherence have another number of lines, rows or columns than the FRF.
+    /// Variance or coherence have a different number of lines, rows or columns than the FRF.
     #[error(
         "the {what} has {found_lines} lines of {found_rows} × {found_columns}, the FRF {lines} lines of {rows} × {columns}"
     )]
@@ -61,7 +61,7 @@ pub enum FrfError {
     /// The damping of the exponential window is not a finite number.
     #[error("the exponential window's damping is {0} 1/s: a finite number that is not negative is needed")]
     Damping(f64),
-    /// One name stands twice among the outputs or the inputs.
+    /// A name occurs twice among the outputs or the inputs.
     #[error("the name `{name}` stands twice among the {side}: rename one of them")]
     RepeatedName {
         /// `outputs` or `inputs`.
@@ -69,14 +69,14 @@ pub enum FrfError {
         /// The name.
         name: String,
     },
-    /// A row or column was asked for that is not there.
+    /// A requested row or column does not exist.
     #[error("there is no `{name}` among the {side} ({available}): check the geometry against the FRF file")]
     MissingName {
         /// `outputs` or `inputs`.
         side: &'static str,
         /// The name.
         name: String,
-        /// The names that are there.
+        /// The available names.
         available: String,
     },
     /// A value is NaN or infinite.
@@ -102,7 +102,7 @@ pub enum FrfError {
         input: String,
         /// The line, Hz.
         frequency_hz: f64,
-        /// What was given.
+        /// The value given.
         variance: f64,
     },
     /// A coherence is not between 0 and 1.
@@ -116,7 +116,7 @@ pub enum FrfError {
         input: String,
         /// The line, Hz.
         frequency_hz: f64,
-        /// What was given.
+        /// The value given.
         coherence: f64,
     },
     /// A line at s = 0 cannot be divided by s.

@@ -1,4 +1,5 @@
-//! FRFs: one complex matrix per frequency line, with the names of its rows and columns and what is known of its noise.
+//! FRFs: one complex matrix per frequency line, with the names of its rows and columns and, if
+//! known, its noise.
 
 use super::error::FrfError;
 use super::quantity::MotionQuantity;
@@ -6,11 +7,12 @@ use nalgebra::{Complex, ComplexField, DMatrix, DMatrixViewMut};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// FRFs of one configuration on the line s = σ + i2πf, with variance and coherence where they are known. SI units.
+/// FRFs of one configuration on the line s = σ + i2πf, with variance and coherence where known. SI
+/// units.
 ///
-/// `lines()[l][(o, i)]` is the response at `outputs()[o]`, along that channel's direction, per newton at
-/// `inputs()[i]`, in that impact's direction, sign included. Shapes, axis and names always agree. A value that was not
-/// measured is NaN: see [`Frf::check_finite`].
+/// `lines()[l][(o, i)]` is the response at `outputs()[o]`, along that channel's direction, per
+/// newton at `inputs()[i]`, in that impact's direction, sign included. Shapes, axis and names are
+/// always consistent. A value that was not measured is NaN: see [`Frf::check_finite`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frf {
     frequency_hz: Vec<f64>,
@@ -24,11 +26,12 @@ pub struct Frf {
 }
 
 impl Frf {
-    /// FRFs at `frequency_hz`, rising, under an exponential window of the damping `sigma_per_s` (0 without a window): one matrix
-    /// (output × input) per line, each output and input with a name of its own. Their noise is not known.
+    /// FRFs at `frequency_hz`, rising, measured with an exponential window of the damping
+    /// `sigma_per_s` (0 without a window): one matrix (output × input) per line, with unique names
+    /// of the outputs and of the inputs. Their noise is unknown.
     ///
     /// # Errors
-    /// The first disagreement found.
+    /// The first inconsistency found.
     pub fn new(
         frequency_hz: Vec<f64>,
         sigma_per_s: f64,
@@ -75,11 +78,13 @@ impl Frf {
         })
     }
 
-    /// The same with this variance (output × input per line) of the real part of each value, and of its imaginary part (the complex
-    /// variance is twice that), in the square of the FRF's own unit; NaN where it is not known (a single hit).
+    /// Adds this variance (output × input per line) of the real part of each value, which equals
+    /// that of its imaginary part (the complex variance is twice that), in the square of the FRF's
+    /// unit; NaN where it is unknown (a single hit).
     ///
-    /// Noise of different cells counts as independent: true for the sensors' floor, while the force cell's own noise, common to the
-    /// three axes of one hit, is far below it.
+    /// The noise of different cells is assumed independent. This holds for the sensors' noise
+    /// floor; the force cell's noise, which is common to the three axes of one hit, is far below
+    /// it.
     ///
     /// # Errors
     /// [`FrfError::Beside`].
@@ -88,7 +93,7 @@ impl Frf {
         Ok(Frf { variance: Some(variance), ..self })
     }
 
-    /// The same with this coherence (output × input per line); NaN where it is not known (a single hit).
+    /// Adds this coherence (output × input per line); NaN where it is unknown (a single hit).
     ///
     /// # Errors
     /// [`FrfError::Beside`].
@@ -97,13 +102,13 @@ impl Frf {
         Ok(Frf { coherence: Some(coherence), ..self })
     }
 
-    /// The same with nothing known of its noise: neither variance nor coherence.
+    /// Removes all noise information: variance and coherence.
     #[must_use]
     pub fn without_noise(self) -> Frf {
         Frf { variance: None, coherence: None, ..self }
     }
 
-    /// Other values on the same axis, in the same quantity, under the same names; their noise is not known.
+    /// Other values with the same axis, quantity and names; their noise is unknown.
     ///
     /// # Errors
     /// [`FrfError::LineCount`] or [`FrfError::Shape`].
@@ -112,10 +117,10 @@ impl Frf {
         Frf::new(self.frequency_hz.clone(), self.sigma_per_s, self.quantity, outputs, inputs, lines)
     }
 
-    /// The same under other names, each a name of its own.
+    /// The same FRFs with other, unique names.
     ///
     /// # Errors
-    /// [`FrfError::Shape`] for another number of names, [`FrfError::RepeatedName`].
+    /// [`FrfError::Shape`] for a different number of names, [`FrfError::RepeatedName`].
     pub fn renamed(self, outputs: Vec<String>, inputs: Vec<String>) -> Result<Frf, FrfError> {
         if (outputs.len(), inputs.len()) != (self.outputs.len(), self.inputs.len()) {
             let (rows, columns) = (self.outputs.len(), self.inputs.len());
@@ -127,7 +132,7 @@ impl Frf {
         Ok(Frf { outputs, inputs, ..self })
     }
 
-    /// The same with every line's values changed by `change`, which is told the line's index.
+    /// Changes every line's values in place with `change`, which receives the line's index.
     #[must_use]
     pub fn map_lines(mut self, mut change: impl FnMut(usize, DMatrixViewMut<'_, Complex<f64>>)) -> Frf {
         for (line, y) in self.lines.iter_mut().enumerate() {
@@ -157,7 +162,7 @@ impl Frf {
         self.sigma_per_s
     }
 
-    /// What the values are.
+    /// The quantity of the values.
     pub fn quantity(&self) -> MotionQuantity {
         self.quantity
     }
@@ -177,12 +182,12 @@ impl Frf {
         &self.lines
     }
 
-    /// Variance of the real part of each value, if it is known: see [`Frf::with_variance`].
+    /// Variance of the real part of each value, if known: see [`Frf::with_variance`].
     pub fn variance(&self) -> Option<&[DMatrix<f64>]> {
         self.variance.as_deref()
     }
 
-    /// Coherence (output × input) per line, if it is known; NaN where a cell has a single hit.
+    /// Coherence (output × input per line), if known; NaN where a cell has a single hit.
     pub fn coherence(&self) -> Option<&[DMatrix<f64>]> {
         self.coherence.as_deref()
     }
@@ -192,8 +197,9 @@ impl Frf {
         Complex::new(self.sigma_per_s, TAU * self.frequency_hz[line])
     }
 
-    /// The same FRFs as receptances (m/N): divided by s once or twice, the variance by |s|² or |s|⁴. Under an exponential window
-    /// it is s that differentiation multiplies by, not iω; dividing by iω would shift the phase by atan(σ/ω).
+    /// The same FRFs as receptances (m/N): divided by s once or twice, the variance by |s|² or
+    /// |s|⁴. With an exponential window, differentiation multiplies by s, not iω; dividing by iω
+    /// would shift the phase by atan(σ/ω).
     ///
     /// # Errors
     /// [`FrfError::DivisionByZero`] for a mobility or accelerance at s = 0.
@@ -205,7 +211,7 @@ impl Frf {
             if order > 0 && s.norm() == 0.0 {
                 return Err(FrfError::DivisionByZero { line, quantity: self.quantity });
             }
-            // not ComplexField::powi, which rounds differently
+            // ComplexField::powi would round differently
             lines.push(y * Complex::powi(&s, -order));
         }
         let scaled = |(line, v): (usize, &DMatrix<f64>)| v * self.s(line).norm_sqr().powi(-order);
@@ -250,14 +256,14 @@ impl Frf {
         self.at(&(0..self.lines.len()).filter(inside).collect::<Vec<_>>())
     }
 
-    /// As [`Frf::band`], of FRFs that nobody else needs: copied only where lines are left out.
+    /// As [`Frf::band`], but takes ownership, so it copies only when lines are dropped.
     #[must_use]
     pub fn into_band(self, low_hz: f64, high_hz: f64) -> Frf {
         let whole = self.frequency_hz.iter().all(|f| (low_hz..=high_hz).contains(f));
         if whole { self } else { self.band(low_hz, high_hz) }
     }
 
-    /// These lines, whose indices rise.
+    /// The lines with these rising indices.
     pub(crate) fn at(&self, lines: &[usize]) -> Frf {
         let noise = |all: &Vec<DMatrix<f64>>| lines.iter().map(|&l| all[l].clone()).collect();
         Frf {

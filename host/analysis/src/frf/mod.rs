@@ -1,4 +1,5 @@
-//! Frequency response functions: one complex matrix per line, what its values are, and their noise.
+//! Frequency response functions: one complex matrix per line, the quantity of its values, and their
+//! noise.
 
 mod checks;
 pub mod common_lines;

@@ -1,14 +1,17 @@
-//! Noise of measured FRFs: what the variance of every cell and line is used as, and how neighbouring lines share it.
+//! Noise of measured FRFs: the variance used for each cell and line, and the correlation between
+//! neighbouring lines.
 
 use super::{Frf, block};
 use crate::parallel::prelude::*;
 use nalgebra::DMatrix;
 
-/// Variances are averaged over this many Hz on either side: one from a handful of hits scatters by its own size.
+/// Variances are averaged over this many Hz on either side, because a variance from a handful of
+/// hits scatters by its own size.
 pub const SMOOTH_HZ: f64 = 10.0;
 
 impl Frf {
-    /// The same with one standard deviation of the real and of the imaginary part in all cells of a line: this fraction of their rms.
+    /// The same FRFs with one standard deviation of the real and of the imaginary part in all cells
+    /// of a line: this fraction of their rms.
     #[must_use]
     pub fn with_relative_noise(mut self, fraction: f64) -> Frf {
         let variance = (self.lines().iter())
@@ -22,7 +25,8 @@ impl Frf {
         self
     }
 
-    /// The variance of all cells, each averaged over the lines within ± [`SMOOTH_HZ`]; NaN where it is not known.
+    /// The variance of all cells, each averaged over the lines within ± [`SMOOTH_HZ`]; NaN where it
+    /// is unknown.
     pub(crate) fn smooth_variance(&self) -> Vec<DMatrix<f64>> {
         match self.variance() {
             Some(variance) => smoothed(variance, self.frequency_hz()),
@@ -30,8 +34,9 @@ impl Frf {
         }
     }
 
-    /// The variance of these cells' receptances at these lines, divided by |s|² or |s|⁴ as the FRF itself is by s or s², and averaged over
-    /// the lines within ± [`SMOOTH_HZ`]; none where it is not known.
+    /// The variance of these cells' receptances at these lines, divided by |s|² or |s|⁴ as the FRF
+    /// itself is by s or s², and averaged over the lines within ± [`SMOOTH_HZ`]; `None` if it is
+    /// unknown.
     pub(crate) fn receptance_variance(
         &self,
         lines: &[usize],
@@ -46,10 +51,10 @@ impl Frf {
     }
 }
 
-/// Every cell averaged over the lines within ± [`SMOOTH_HZ`]; unknown values are left out.
+/// Averages every cell over the lines within ± [`SMOOTH_HZ`]; unknown values are left out.
 ///
-/// A variance from a handful of hits scatters by as much as its own size, and whoever weighs lines with it prefers
-/// the lines whose noise looks small by chance. The floor itself is smooth.
+/// A variance from a handful of hits scatters by as much as its own size, so weights based on it
+/// would favour lines whose noise looks small by chance. The noise floor itself is smooth.
 fn smoothed(known: &[DMatrix<f64>], frequency_hz: &[f64]) -> Vec<DMatrix<f64>> {
     let Some(first) = known.first() else { return Vec::new() };
     let (rows, columns) = first.shape();
@@ -61,7 +66,7 @@ fn smoothed(known: &[DMatrix<f64>], frequency_hz: &[f64]) -> Vec<DMatrix<f64>> {
         })
         .collect();
     let by_row = |row: usize, column: usize| -> Vec<f64> {
-        // sums from the left: a window's sum is a difference of two of them
+        // cumulative sums: the sum over a window is the difference of two of them
         let (mut sum, mut count) = (0.0, 0usize);
         let mut sums = Vec::with_capacity(known.len() + 1);
         sums.push((sum, count));
@@ -86,10 +91,11 @@ fn smoothed(known: &[DMatrix<f64>], frequency_hz: &[f64]) -> Vec<DMatrix<f64>> {
     (0..known.len()).into_par_iter().map(line).collect()
 }
 
-/// By how much the variance of a sum over many lines exceeds that of independent lines.
+/// Factor by which the variance of a sum over many lines exceeds that of independent lines.
 ///
-/// White noise under e^(−σt) has the correlation 2σ/(2σ − i2πΔf) between lines Δf apart; summed over all distances that is
-/// x coth x with x = σ/Δf. Without a window the lines of a record are independent: 1.
+/// White noise multiplied by e^(−σt) has the correlation 2σ/(2σ − i2πΔf) between lines Δf apart;
+/// summed over all distances this is x coth x with x = σ/Δf. Without a window the lines of a record
+/// are independent, and the factor is 1.
 pub fn shared_by_lines(sigma_per_s: f64, step_hz: f64) -> f64 {
     let x = sigma_per_s / step_hz;
     if x > 1e-6 && x.is_finite() { x / x.tanh() } else { 1.0 }
@@ -110,7 +116,7 @@ mod tests {
     fn lines_of_a_window_share_their_noise() {
         let (sigma, step) = (2.3, 0.5);
         let sum: f64 = (-40_000..=40_000).map(|k| line_correlation(sigma, f64::from(k) * step)).sum();
-        // the sum's tail beyond 40 000 lines is 1/(π² 40 000) of itself
+        // the tail of the sum beyond 40 000 lines is 1/(π² 40 000) of it
         assert!((shared_by_lines(sigma, step) / sum - 1.0).abs() < 1e-4);
         assert_eq!(shared_by_lines(0.0, step), 1.0);
     }

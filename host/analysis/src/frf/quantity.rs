@@ -1,8 +1,8 @@
-//! What a response is, and what that makes of an FRF.
+//! The quantity of a response, and the corresponding type of FRF.
 
 use serde::{Deserialize, Serialize};
 
-/// What a response is; an FRF's numerator, per newton of the hammer's force.
+/// The quantity of a response: the numerator of an FRF, per newton of the hammer's force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MotionQuantity {
@@ -15,11 +15,11 @@ pub enum MotionQuantity {
 }
 
 impl MotionQuantity {
-    /// All of them, each the time derivative of the one before.
+    /// All quantities, each the time derivative of the one before.
     const ALL: [MotionQuantity; 3] =
         [MotionQuantity::Displacement, MotionQuantity::Velocity, MotionQuantity::Acceleration];
 
-    /// The word used in files of records.
+    /// The name used in record files.
     pub fn name(self) -> &'static str {
         match self {
             MotionQuantity::Displacement => "displacement",
@@ -33,7 +33,7 @@ impl MotionQuantity {
         Self::ALL.into_iter().find(|q| q.name() == name.trim().to_lowercase())
     }
 
-    /// What an FRF of such a response is called, in files too.
+    /// Name of the FRF of such a response, also used in files.
     pub fn frf_name(self) -> &'static str {
         match self {
             MotionQuantity::Displacement => "receptance",
@@ -47,7 +47,7 @@ impl MotionQuantity {
         Self::ALL.into_iter().find(|q| q.frf_name() == name.trim().to_lowercase())
     }
 
-    /// How many times the displacement was multiplied by s: 0, 1 or 2.
+    /// Power of s by which the displacement is multiplied: 0, 1 or 2.
     pub fn order_of_s(self) -> i32 {
         self as i32
     }

@@ -1,4 +1,4 @@
-//! The front door: a record in, its loop's figures out.
+//! Entry point of the module: takes a record and returns the figures of its loop.
 
 use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
@@ -12,20 +12,22 @@ use super::record::{HysteresisRecord, Relative};
 use super::shape::Shape;
 use super::steady::shaker;
 
-/// A record without an excitation frequency is steady when its last quarter is this strong against its first.
+/// A record without an excitation frequency counts as steady when the strength of its last quarter
+/// is at least this fraction of that of its first.
 const STEADY: f64 = 0.7;
 
-/// A decay's frequency below this fraction of its later one is slip softening the joint: some of it, all of it.
+/// If the frequency early in a decay is below this fraction of the later one, slip is softening the
+/// joint: partial slip, gross slip.
 const SOFTENED: (f64, f64) = (0.9, 0.6);
 
-/// A line explaining less of T than this in the first cycles is no clean loop.
+/// If a straight line explains less of T than this in the first cycles, the loop is not clean.
 const CLEAN_LINE: f64 = 0.95;
 
-/// Analyses a record. With an excitation frequency it is taken as a shaker record; without one it is a shaker record if the motion
-/// is steady, and an impact if it decays.
+/// Analyses a record. With an excitation frequency it is treated as a shaker record; without one it
+/// is treated as a shaker record if the motion is steady, and as an impact if it decays.
 ///
 /// # Errors
-/// [`HysteresisError`] when the signals do not fit together, nothing moves, or there is no whole cycle.
+/// [`HysteresisError`] when the signals do not match, nothing moves, or there is no whole cycle.
 pub fn analyse(record: &HysteresisRecord) -> Result<LoopAnalysis, HysteresisError> {
     match excitation(record)? {
         Some(frequency_hz) => shaker(record, [None], frequency_hz).map(|[found]| found),
@@ -33,7 +35,7 @@ pub fn analyse(record: &HysteresisRecord) -> Result<LoopAnalysis, HysteresisErro
     }
 }
 
-/// As [`analyse`], with the force at the contact in place of the load cells' sum.
+/// As [`analyse`], with the force at the contact instead of the load cells' sum.
 ///
 /// # Errors
 /// As [`analyse`].
@@ -44,12 +46,13 @@ pub fn analyse_corrected(
     if record.excitation_hz.is_none() {
         return analyse(&correction.applied(record));
     }
-    // a shaker's record is long: no second one is made of it
+    // a shaker record is long, so it is not copied
     let frequency_hz = excitation(record)?.ok_or(HysteresisError::NoMotion)?;
     shaker(record, [Some(correction)], frequency_hz).map(|[found]| found)
 }
 
-/// What [`analyse`] and [`analyse_corrected`] say, in this order; the cycles of a shaker's record are cut once for both.
+/// The results of [`analyse`] and [`analyse_corrected`], in this order; the cycles of a shaker
+/// record are cut once for both.
 ///
 /// # Errors
 /// As [`analyse`].
@@ -64,7 +67,7 @@ pub fn analyse_both(
     shaker(record, [None, Some(correction)], frequency_hz)
 }
 
-/// The frequency of a steady record that is good; none of one that decays.
+/// The frequency of a valid steady record; `None` for one that decays.
 fn excitation(record: &HysteresisRecord) -> Result<Option<f64>, HysteresisError> {
     record.check()?;
     match record.excitation_hz {
@@ -86,13 +89,13 @@ fn is_steady(force_n: &[f64]) -> bool {
     quarter > 0 && strength(&force_n[3 * quarter..4 * quarter]) > STEADY * strength(&force_n[..quarter])
 }
 
-/// A resonance of one specimen that the record itself shows.
+/// A resonance of one specimen that is visible in the record itself.
 fn hidden_resonance(record: &HysteresisRecord) -> Option<ImaginaryPeak> {
     let contact = ContactCompliance::of_record(record, SEARCH_HZ)?;
     contact.imaginary_peak().filter(ImaginaryPeak::stands_out)
 }
 
-/// The first `most` cycles of the decay after a hit, and its shape; none of a record that is steady.
+/// The first `most` cycles of the decay after a hit, and its shape; `None` for a steady record.
 pub(super) fn decay_of(
     record: &HysteresisRecord,
     most: usize,
@@ -124,7 +127,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
     let (from, to) = (used[0].first_sample, used[used.len() - 1].end_sample);
     let shape = shape_of(&decay);
     let hidden = hidden_resonance(record);
-    // the loops of a decay do not close, and have no energy to ask
+    // the loops of a decay do not close, so they have no energy to check
     let findings: Vec<LoopFinding> = (k.mean < 0.0)
         .then_some(LoopFinding::ReversedForce { k_eq_n_per_m: k.mean, energy_j: 0.0 })
         .into_iter()

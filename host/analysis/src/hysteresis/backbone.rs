@@ -1,36 +1,42 @@
-//! The backbone: how force and stiffness of a slipping contact go with amplitude, as a law through several levels.
+//! The backbone: how force and stiffness of a slipping contact depend on amplitude, as a law fitted
+//! to several levels.
 //!
-//! The law is Iwan's with sliders whose limits are spread evenly from (1 − s) to (1 + s) times their mean: k is its stiffness while all
-//! of them stick, L the force with all of them slipping. Without spread it is Jenkins's single slider. At the tip of a loop of amplitude X
-//! each slider carries kX or its limit, whichever is less, however Δx ran on its way there (Masing's rule); the least-squares slope
-//! k_eq would ask for a sine, which a slipping contact does not leave. So the law goes through the peak secants.
+//! The law is Iwan's, with slider limits spread evenly from (1 − s) to (1 + s) times their mean: k
+//! is its stiffness while all sliders stick, L the force while all of them slip. Without spread it
+//! is a single Jenkins slider. At the tip of a loop of amplitude X each slider carries kX or its
+//! limit, whichever is less, whatever path Δx took to get there (Masing's rule). The least-squares
+//! slope k_eq would require a sinusoidal Δx, which a slipping contact does not have. The law is
+//! therefore fitted to the peak secants.
 
 use serde::Serialize;
 
-/// Sliders that stand for the spread.
+/// Number of sliders that represent the spread.
 const SLIDERS: usize = 20;
 
-/// Three quantities are sought: fewer levels than this say nothing of how well they fit.
+/// Three quantities are fitted: with fewer levels than this, the quality of the fit cannot be
+/// judged.
 pub const FEWEST_LEVELS: usize = 4;
 
-/// Finest step of the spread, and of the reach in its logarithm.
+/// Finest step of the spread, and of the logarithm of the reach.
 const FINEST: f64 = 1e-3;
 
-/// A law through several levels.
+/// A law fitted to several levels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Law {
-    /// Stiffness with everything stuck, N/m.
+    /// Stiffness while everything sticks, N/m.
     pub stiffness_n_per_m: f64,
-    /// Force with everything slipping, N.
+    /// Force while everything slips, N.
     pub limit_n: f64,
-    /// Half the width of the sliders' limits over their mean, 0 (one slider) to 1.
+    /// Half the width of the distribution of the sliders' limits over their mean, 0 (one slider) to
+    /// 1.
     pub spread: f64,
-    /// Root mean square of what the levels' secants differ by from the law, over themselves.
+    /// Root mean square of the relative differences between the law and the levels' secants.
     pub residual: f64,
 }
 
 impl Law {
-    /// Through levels (amplitude of Δx in m, peak secant in N/m); none for too few, or where nothing gets softer.
+    /// Fits levels (amplitude of Δx in m, peak secant in N/m); `None` if there are too few, or if
+    /// the stiffness never falls.
     pub fn through(levels: &[(f64, f64)]) -> Option<Law> {
         let usable = |(x, k): &(f64, f64)| *x > 0.0 && *k > 0.0 && x.is_finite() && k.is_finite();
         if levels.len() < FEWEST_LEVELS || !levels.iter().all(usable) {
@@ -38,7 +44,7 @@ impl Law {
         }
         let (low, high) =
             levels.iter().fold((f64::INFINITY, 0.0f64), |(l, h), (x, _)| (l.min(*x), h.max(*x)));
-        // a grid finds the valley, and halving steps its floor
+        // a grid search finds the region of the minimum; halving the steps refines it
         let spreads = (0..=19).map(|i| 0.05 * f64::from(i));
         let reaches = (0..=60).map(|i| 0.1 * low * (10.0 * high / low).powf(f64::from(i) / 60.0));
         let grid = spreads.flat_map(|s| reaches.clone().map(move |r| (r, s)));
@@ -63,11 +69,11 @@ impl Law {
                 None => step *= 0.5,
             }
         }
-        // the weakest slider must let go below the largest amplitude
+        // the weakest slider must slip below the largest amplitude
         (at.0 * (1.0 - at.1) < high).then(|| Self::with(levels, at.0, at.1))
     }
 
-    /// With this reach L/k (m) and spread; the stiffness follows.
+    /// With this reach L/k (m) and spread; the stiffness follows by least squares.
     fn with(levels: &[(f64, f64)], reach: f64, spread: f64) -> Law {
         let parts = levels.iter().map(|(x, k)| part(*x, reach, spread) / k);
         let (sum, squares) = parts.clone().fold((0.0, 0.0), |(s, q), a| (s + a, q + a * a));
@@ -89,13 +95,13 @@ impl Law {
     }
 }
 
-/// Mean over the sliders of a function of their limit over the mean limit.
+/// Mean over the sliders of a function of (slider limit / mean limit).
 fn mean(spread: f64, of: impl Fn(f64) -> f64) -> f64 {
     let limit = |i: usize| 1.0 + spread * (2.0 * i as f64 / (SLIDERS - 1) as f64 - 1.0);
     (0..SLIDERS).map(|i| of(limit(i))).sum::<f64>() / SLIDERS as f64
 }
 
-/// The secant at an amplitude over the stuck stiffness.
+/// The secant at an amplitude over the stiffness while everything sticks.
 fn part(amplitude_m: f64, reach: f64, spread: f64) -> f64 {
     mean(spread, |u| (reach * u / amplitude_m).min(1.0))
 }
@@ -108,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_single_slider_has_its_closed_form() {
-        // the text book's example: 28.5 N/µm and 171 N at 6 µm
+        // the textbook example: 28.5 N/µm and 171 N at 6 µm
         assert!((LAW.secant(6e-6) / 28.5e6 - 1.0).abs() < 1e-9, "{}", LAW.secant(6e-6));
         assert!(
             (LAW.secant(1e-6) / 143.7e6 - 1.0).abs() < 1e-12 && (LAW.tip(6e-6) / 171.0 - 1.0).abs() < 1e-12

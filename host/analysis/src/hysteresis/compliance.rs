@@ -1,29 +1,32 @@
-//! The contact in frequency: Δx per newton of T, and what hides in it.
+//! The contact in the frequency domain: Δx per newton of T, and how a hidden resonance shows in it.
 //!
-//! A contact alone is a real, constant compliance. A resonance that only one of the measured spots takes part in (a specimen that
-//! turns in its clamp) gives it an imaginary part near its frequency: loops there become ellipses.
+//! A contact alone is a real, constant compliance. A resonance that moves only one of the measured
+//! points (a specimen that rotates in its clamp) gives it an imaginary part near its frequency:
+//! loops there become ellipses.
 
 use super::record::{HysteresisRecord, Relative};
 use crate::transforms::forward;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Where a resonance of a specimen is looked for, Hz: below, the loops are quasi-static; above, Δx drowns in noise.
+/// Range in which a resonance of a specimen is searched, Hz: below it, the loops are quasi-static;
+/// above it, Δx is buried in noise.
 pub const SEARCH_HZ: [f64; 2] = [100.0, 400.0];
 
-/// Lines are averaged to this distance, Hz: well inside a resonance of 1 % at 192 Hz.
+/// Lines are averaged to this spacing, Hz: narrow compared with a resonance of 1 % damping at 192
+/// Hz.
 const STEP_HZ: f64 = 0.5;
 
-/// Width of the average before a peak is looked for, Hz.
+/// Width of the moving average applied before the peak search, Hz.
 const SMOOTH_HZ: f64 = 1.5;
 
-/// Fewer lines hold no peak and no level to compare it with.
+/// With fewer lines there is neither a peak nor a level to compare it with.
 const FEWEST_LINES: usize = 30;
 
 /// D(s) = Δx / T over frequency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactCompliance {
-    /// The lines, Hz, equidistant.
+    /// The lines, Hz, equally spaced.
     pub frequency_hz: Vec<f64>,
     /// D, m/N.
     pub compliance_m_per_n: Vec<Complex<f64>>,
@@ -32,7 +35,7 @@ pub struct ContactCompliance {
 /// Where the imaginary part of Δx/T is largest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImaginaryPeak {
-    /// Where, Hz.
+    /// Frequency of the peak, Hz.
     pub frequency_hz: f64,
     /// |Im D| there over the level of |Re D|.
     pub over_level: f64,
@@ -41,15 +44,16 @@ pub struct ImaginaryPeak {
 }
 
 impl ImaginaryPeak {
-    /// Whether this is a resonance beyond doubt.
+    /// Whether the peak is clearly a resonance.
     pub fn stands_out(&self) -> bool {
         self.over_level > 0.5 && self.over_median > 5.0
     }
 }
 
 impl ContactCompliance {
-    /// From one record that begins and ends at rest (a sweep, a decay), over `band_hz`: spectra of the whole record, so that it does
-    /// not matter when which frequency was there. None where the band holds no line.
+    /// From one record that begins and ends at rest (a sweep, a decay), over `band_hz`. The spectra
+    /// are those of the whole record, so the order in which frequencies were excited does not
+    /// matter. `None` if the band holds no line.
     pub fn of_record(record: &HysteresisRecord, band_hz: [f64; 2]) -> Option<Self> {
         let step_hz = record.fs_hz / record.force_n.len() as f64;
         let (relative, per_velocity) = match record.relative() {
@@ -89,7 +93,8 @@ impl ContactCompliance {
             .collect()
     }
 
-    /// The largest imaginary part between 100 and 400 Hz, averaged over 1.5 Hz; none with too few lines there.
+    /// The largest imaginary part between 100 and 400 Hz, averaged over 1.5 Hz; `None` with too few
+    /// lines there.
     pub fn imaginary_peak(&self) -> Option<ImaginaryPeak> {
         let smooth = self.smoothed();
         if smooth.len() < FEWEST_LINES {
@@ -114,7 +119,7 @@ fn spectrum(mut x: Vec<f64>) -> Option<Vec<Complex<f64>>> {
     Some(out)
 }
 
-/// The middle of a list that is not empty.
+/// The median of a list that is not empty.
 fn median(mut values: Vec<f64>) -> f64 {
     let at = values.len() / 2;
     *values.select_nth_unstable_by(at, f64::total_cmp).1
@@ -127,7 +132,8 @@ mod tests {
 
     const FS: f64 = 8_192.0;
 
-    /// A force sweep from rest to rest over a contact of 180 N/µm, behind which an oscillator of strength `share` turns at 192 Hz.
+    /// A force sweep from rest to rest over a contact of 180 N/µm, with an oscillator of strength
+    /// `share` at 192 Hz in series.
     fn swept(share: f64) -> HysteresisRecord {
         let n = 16 * 8_192;
         let (low, high) = (100.0, 400.0);
@@ -149,7 +155,7 @@ mod tests {
         let moved: Vec<f64> = force_n
             .iter()
             .map(|f| {
-                // the oscillator of share / 180 N/µm, symplectic
+                // the oscillator of share / 180 N/µm, integrated with a symplectic step
                 v += (w * w * (share * f / 180e6 - x) - 0.02 * w * v) / FS;
                 x += v / FS;
                 f / 180e6 + x

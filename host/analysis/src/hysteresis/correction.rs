@@ -1,19 +1,20 @@
 //! From the load cells' sum to the force at the contact.
 //!
-//! Between contact and load cells lies the static arm B. What the contact gives to B goes into the load cells, into whatever stands
-//! parallel to them (a lower push rod), and into B's acceleration:
+//! The static arm B lies between contact and load cells. The force of the contact on B is balanced
+//! by the load cells, by anything parallel to them (a lower push rod), and by B's inertia:
 //!
 //! F = (1 + ρ) T + m ẍ_B
 //!
-//! with T the cells' sum, ρ the stiffness beside the cells over theirs, and m B's *effective* mass at the contact. That is not the
-//! arm's mass: the arm also turns about its supports, so that only part of it moves along. T reads too much by 2.4 % at 250 Hz and 14 % at
-//! 500 Hz on a rig of 1.56 kg over 150 N/µm.
+//! with T the cells' sum, ρ the stiffness parallel to the cells over theirs, and m B's *effective*
+//! mass at the contact. This is not the arm's mass: the arm also rotates about its supports, so
+//! that only part of it moves with the contact. On a rig of 1.56 kg over 150 N/µm, T reads 2.4 %
+//! too high at 250 Hz and 14 % at 500 Hz.
 
 use super::record::{HysteresisRecord, RelativeMotion, within};
 use serde::Serialize;
 use std::ops::Range;
 
-/// What the raw force is corrected by.
+/// The parameters that correct the raw force.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Correction {
     /// m, kg.
@@ -23,7 +24,7 @@ pub struct Correction {
 }
 
 impl Correction {
-    /// The same record with the force at the contact in place of the load cells' sum.
+    /// The same record with the force at the contact instead of the load cells' sum.
     #[must_use]
     pub fn applied(&self, record: &HysteresisRecord) -> HysteresisRecord {
         let mut force_n = Vec::with_capacity(record.force_n.len());
@@ -31,7 +32,8 @@ impl Correction {
         HysteresisRecord { force_n, ..record.clone() }
     }
 
-    /// The force at the contact over a range of samples, into `to`; beyond the record's ends its values go on.
+    /// Writes the force at the contact over a range of samples to `to`; beyond the ends of the
+    /// record its end values are repeated.
     pub(super) fn force(&self, record: &HysteresisRecord, range: Range<isize>, to: &mut Vec<f64>) {
         let (t, fs_hz) = (&record.force_n, record.fs_hz);
         let corrected = |t: &f64, acceleration: f64| {
@@ -60,7 +62,8 @@ impl Correction {
     }
 }
 
-/// The neighbours of sample `i` of `len` (two or more), itself at the ends.
+/// The neighbours of sample `i` of `len` (two or more); at an end, the sample itself replaces the
+/// missing one.
 fn around(i: usize, len: usize) -> (usize, usize) {
     (i.saturating_sub(1), (i + 1).min(len - 1))
 }
@@ -76,7 +79,8 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// An arm of mass m on load cells of stiffness k and a rod of ρ k: the corrected force is the contact's, at every frequency.
+    /// An arm of mass m on load cells of stiffness k and a rod of ρ k: the corrected force equals
+    /// that of the contact at every frequency.
     #[test]
     fn the_contacts_force_comes_back() {
         let (mass, k, path, contact) = (1.56, 150e6, 0.0133, 180e6);
@@ -102,7 +106,7 @@ mod tests {
             };
             let (raw, corrected) = (k_t(&record), k_t(&correction.applied(&record)));
             assert!((corrected / contact - 1.0).abs() < 1e-3, "{frequency_hz}: {corrected}");
-            // what it would be without
+            // the error without the correction
             assert!((raw / contact - k / stiffness).abs() < 1e-3, "{frequency_hz}: {raw}");
         }
     }

@@ -1,7 +1,8 @@
-//! Cutting a steady record into its cycles.
+//! Cuts a steady record into its cycles.
 //!
-//! A minute of a record has thousands of cycles, and all of them as vectors would be several times the record. So they are cut
-//! when they are wanted, on all cores, and what is needed of all of them is summed up on the way.
+//! One minute of a record has thousands of cycles, and storing all of them as vectors would take
+//! several times the memory of the record. They are therefore cut on demand, on all cores, and
+//! whatever is needed of all cycles is summed in the same pass.
 
 use super::HysteresisError;
 use super::correction::Correction;
@@ -16,28 +17,31 @@ use crate::parallel::prelude::*;
 use crate::vectors::wide;
 use std::ops::Range;
 
-/// Fewer samples than this make no loop.
+/// A cycle with fewer samples than this is not a loop.
 const FEWEST_SAMPLES: usize = 16;
 
-/// The velocity of a measured displacement is its difference over twice this part of a cycle, which loses 1.6e-3 of a sine.
+/// The velocity of a measured displacement is the difference over twice this fraction of a cycle,
+/// which underestimates a sine by 1.6e-3.
 const POINTS_FOR_VELOCITY: usize = 64;
 
-/// Cycles that are summed one after the other; fixed, so that rounding does not depend on the number of cores.
+/// Number of cycles that are summed sequentially; fixed, so that rounding does not depend on the
+/// number of cores.
 const BLOCK: usize = 64;
 
-/// Which force a cycle holds: the load cells' sum, or that at the contact.
+/// Which force a cycle holds: the load cells' sum, or the force at the contact.
 pub(super) type Force<'a> = Option<&'a Correction>;
 
-/// All whole cycles of a steady record, each resampled to the same number of points: a period need not be a whole number of samples.
+/// All whole cycles of a steady record, each resampled to the same number of points, since a period
+/// need not be a whole number of samples.
 pub(super) struct Steady<'a> {
     record: &'a HysteresisRecord,
     timing: Timing,
     points: usize,
-    /// Numbers of the cycles that are used, counted from the record's beginning.
+    /// Indices of the cycles used, counted from the beginning of the record.
     used: Range<usize>,
 }
 
-/// What all cycles give together.
+/// Results over all cycles.
 pub(super) struct Summed {
     /// The average cycle, point by point.
     pub mean: Cycle,
@@ -47,24 +51,26 @@ pub(super) struct Summed {
     pub energies: Vec<f64>,
     /// Harmonics of each cycle.
     pub harmonics: Vec<Harmonics>,
-    /// The same before a drift was taken out; empty where none was. A cycle that grows moves the mean, which looks like a drift.
+    /// The harmonics before the drift was removed; empty if there was none. A cycle with growing
+    /// amplitude also shifts the mean, which looks like a drift.
     pub as_measured: Vec<Harmonics>,
-    /// Those of the average cycle.
+    /// Harmonics of the average cycle.
     pub of_mean: Harmonics,
-    /// How the cycles scatter about their average.
+    /// Scatter of the cycles about their average.
     pub scatter: Scatter,
-    /// How displacement sensors and load cells drift.
+    /// Drift of the displacement sensors and load cells.
     drift: Drifts,
 }
 
-/// How displacement and force drift from cycle to cycle: what each changes over each cycle. Empty without a drift.
+/// How displacement and force drift from cycle to cycle: the change of each over each cycle. Empty
+/// without a drift.
 #[derive(Debug, Clone, Default)]
 struct Drifts {
     motion: Vec<f64>,
     force: Vec<f64>,
 }
 
-/// Mean products of what single cycles differ by from their average, per point.
+/// Mean products of the deviations of single cycles from their average, per point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scatter {
     /// Number of cycles.
@@ -73,14 +79,14 @@ pub(super) struct Scatter {
 }
 
 impl Scatter {
-    /// Mean square of T − k Δx − c Δẋ about that of the average cycle, N².
+    /// Mean square, about the average cycle, of T − k Δx − c Δẋ, N².
     pub fn variance(&self, k: f64, c: f64) -> f64 {
         let [tt, xx, vv, xt, vt, xv] = self.products;
         (tt + k * k * xx + c * c * vv - 2.0 * (k * xt + c * vt - k * c * xv)).max(0.0)
     }
 }
 
-/// TT, xx, vv, xT, vT, xv.
+/// The products TT, xx, vv, xT, vT, xv.
 type Products = [f64; 6];
 
 fn products(cycle: &Cycle) -> Products {
@@ -88,7 +94,7 @@ fn products(cycle: &Cycle) -> Products {
     with_force(of_motion(x, v), x, v, t)
 }
 
-/// xx, vv, xv.
+/// The products xx, vv, xv.
 fn of_motion(x: &[f64], v: &[f64]) -> [f64; 3] {
     [dot(x, x), dot(v, v), dot(x, v)]
 }
@@ -97,7 +103,7 @@ fn with_force([xx, vv, xv]: [f64; 3], x: &[f64], v: &[f64], t: &[f64]) -> Produc
     [dot(t, t), xx, vv, dot(x, t), dot(v, t), xv]
 }
 
-/// One block of cycles, summed with one force.
+/// One block of cycles, summed for one force.
 struct Sums {
     force_n: Vec<f64>,
     force_means: Vec<f64>,
@@ -107,7 +113,7 @@ struct Sums {
     harmonics: Vec<Harmonics>,
 }
 
-/// One block of cycles, summed with `N` forces.
+/// One block of cycles, summed for `N` forces.
 struct Block<const N: usize> {
     displacement_m: Vec<f64>,
     motion_means: Vec<f64>,
@@ -122,22 +128,22 @@ struct Scratch {
     samples: Vec<f64>,
 }
 
-/// Where a cycle lies in the record.
+/// Location of a cycle in the record.
 struct Place {
-    /// Which of the cycles that are used it is.
+    /// Index among the cycles used.
     number: usize,
     /// The samples that it is interpolated from.
     samples: Range<isize>,
-    /// Its first point, in samples after the first of these.
+    /// Its first point, in samples from the first of these.
     from: f64,
-    /// Samples from point to point.
+    /// Distance between points, samples.
     step: f64,
-    /// The same, s.
+    /// The same distance, s.
     dt_s: f64,
 }
 
 impl<'a> Steady<'a> {
-    /// The cycles of this timing in a record that [`HysteresisRecord::check`] found good.
+    /// The cycles of this timing in a record that has passed [`HysteresisRecord::check`].
     ///
     /// # Errors
     /// When there is no whole cycle, or too few samples in one.
@@ -146,7 +152,7 @@ impl<'a> Steady<'a> {
         let time_s = samples as f64 / record.fs_hz;
         let frequency_hz = timing.at(0.5 * time_s);
         let points = (record.fs_hz / frequency_hz).round() as usize;
-        // a hair of tolerance: 20 cycles exactly must not count as 19
+        // tolerance, so that exactly 20 cycles do not count as 19 after rounding
         let cycles = (timing.cycles(time_s) + 1e-6).floor() as usize;
         if cycles == 0 || points < FEWEST_SAMPLES {
             return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
@@ -154,12 +160,12 @@ impl<'a> Steady<'a> {
         Ok(Self { record, timing, points, used: 0..cycles })
     }
 
-    /// Number of cycles that are used.
+    /// Number of cycles used.
     pub fn len(&self) -> usize {
         self.used.len()
     }
 
-    /// The same with these of its cycles alone.
+    /// The same record restricted to these of its cycles.
     pub fn only(&self, cycles: Range<usize>) -> Self {
         let first = self.used.start;
         Self { used: first + cycles.start..first + cycles.end, ..*self }
@@ -171,12 +177,12 @@ impl<'a> Steady<'a> {
         (to - from) / (self.len() * self.points) as f64
     }
 
-    /// The middle of the cycles that are used, s after the first sample.
+    /// The middle of the cycles used, s after the first sample.
     pub fn middle_s(&self) -> f64 {
         self.timing.begin_s(0.5 * (self.used.start + self.used.end) as f64)
     }
 
-    /// `look` at every cycle with this force, in order; `of` is what they gave together.
+    /// Calls `look` for every cycle with this force, in order; `of` is the sum over all of them.
     pub fn each<T: Send>(&self, force: Force<'_>, of: &Summed, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
         let blocks: Vec<Vec<T>> = self.blocks(|cycles| {
             let mut scratch = Scratch::default();
@@ -192,8 +198,9 @@ impl<'a> Steady<'a> {
         blocks.into_iter().flatten().collect()
     }
 
-    /// What all of them give together, with each of these forces: the motion is cut once for all. Where displacement or force
-    /// drifts, the cycles are cut a second time without it.
+    /// Results over all cycles for each of these forces; the motion is cut only once for all of
+    /// them. If displacement or force drifts, the cycles are cut a second time with the drift
+    /// removed.
     pub fn summed<const N: usize>(&self, forces: [Force<'_>; N]) -> [Summed; N] {
         let (summed, drifts) = self.summed_without(forces, &std::array::from_fn(|_| Drifts::default()));
         if drifts.iter().all(|drift| drift.motion.is_empty() && drift.force.is_empty()) {
@@ -205,7 +212,7 @@ impl<'a> Steady<'a> {
             .map(|summed| Summed { as_measured: first.next().unwrap_or_default(), ..summed })
     }
 
-    /// The same after these drifts are taken out, and the drifts that the cycles' means show.
+    /// The same with these drifts removed, and the drifts found in the means of the cycles.
     fn summed_without<const N: usize>(
         &self,
         forces: [Force<'_>; N],
@@ -286,7 +293,7 @@ impl<'a> Steady<'a> {
         };
         for cycle in cycles {
             let place = self.place(cycle);
-            // the motion is the same whichever force goes with it
+            // the motion is the same for every force
             let drift = without.first().map_or(&[][..], |without| &without.motion);
             block.motion_means.push(self.cut_motion(&place, drift, &mut scratch));
             let [x, v, _] = scratch.cycle.signals();
@@ -299,7 +306,7 @@ impl<'a> Steady<'a> {
                 let [x, v, t] = scratch.cycle.signals();
                 let own = with_force(motion, x, v, t);
                 let [_, xx, _, xt, _, _] = own;
-                // both have no mean
+                // the means of both are already removed
                 sums.slopes.push(xt / xx);
                 sums.energies.push(energy(&scratch.cycle));
                 sums.harmonics.push(Harmonics { displacement: of_x, force: wheels.harmonics(t) });
@@ -310,11 +317,11 @@ impl<'a> Steady<'a> {
         block
     }
 
-    /// Where cycle number `cycle` lies.
+    /// Location of cycle number `cycle`.
     fn place(&self, cycle: usize) -> Place {
         let [begin_s, end_s] = [0.0, 1.0].map(|more| self.timing.begin_s(cycle as f64 + more));
         let (begin, period) = (begin_s * self.record.fs_hz, (end_s - begin_s) * self.record.fs_hz);
-        // a cubic takes one sample before and two after
+        // cubic interpolation needs one sample before and two after
         let first = begin.floor() as isize - 1;
         Place {
             number: cycle - self.used.start,
@@ -325,7 +332,8 @@ impl<'a> Steady<'a> {
         }
     }
 
-    /// A cycle's displacement and velocity without the drift; its mean, of what was measured, comes back.
+    /// Cuts displacement and velocity of a cycle and removes the drift; returns the mean of the
+    /// measured signal.
     fn cut_motion(&self, place: &Place, drift: &[f64], scratch: &mut Scratch) -> f64 {
         let Scratch { cycle: cut, samples } = scratch;
         self.record.relative_motion(place.samples.clone(), samples);
@@ -339,7 +347,8 @@ impl<'a> Steady<'a> {
                 std::mem::swap(&mut cut.velocity_m_per_s, &mut cut.displacement_m);
                 let (x, n) = (&cut.displacement_m, self.points);
                 cut.velocity_m_per_s.clear();
-                // over one point, noise would be more than the velocity where a cycle has many points
+                // with many points per cycle, the difference over one point would be dominated by
+                // noise
                 let reach = (n / POINTS_FOR_VELOCITY).max(1);
                 let base_s = 2.0 * reach as f64 * place.dt_s;
                 let slope = |j: usize| (x[(j + reach) % n] - x[(j + n - reach) % n]) / base_s;
@@ -349,7 +358,7 @@ impl<'a> Steady<'a> {
         middle
     }
 
-    /// Its force without the drift, and the mean of it.
+    /// Cuts the force and removes the drift; returns its mean.
     fn cut_force(&self, place: &Place, force: Force<'_>, drift: &[f64], scratch: &mut Scratch) -> f64 {
         let Scratch { cycle: cut, samples } = scratch;
         match force {
@@ -361,17 +370,20 @@ impl<'a> Steady<'a> {
     }
 }
 
-/// A drift that over a cycle changes less than this part of the amplitude moves no figure by 1 in 3000, and is left in.
+/// A drift that changes less than this fraction of the amplitude per cycle shifts no figure by more
+/// than 1 in 3000, and is not removed.
 const DRIFTS: f64 = 1e-3;
 
-/// Sum of the squared steps from mean to mean over that of their squared distances from the mean of all: 2 for means that scatter
-/// independently, near 0 where they drift.
+/// Sum of the squared steps between successive means over the sum of their squared deviations from
+/// the overall mean: 2 for means that scatter independently, near 0 if they drift.
 const SMOOTH: f64 = 0.5;
 
-/// Fewer means than this cannot tell drift from scatter: what they change by is taken out as drift.
+/// With fewer means, drift and scatter cannot be distinguished: their change is then removed as
+/// drift.
 const FEWEST_MEANS: usize = 6;
 
-/// What a signal of this amplitude drifts by over each cycle, from the means of all cycles; empty where it does not drift.
+/// The drift over each cycle of a signal of this amplitude, from the means of all cycles; empty if
+/// it does not drift.
 fn per_cycle(means: &[f64], amplitude: f64) -> Vec<f64> {
     let n = means.len();
     if n < 2 {
@@ -379,7 +391,7 @@ fn per_cycle(means: &[f64], amplitude: f64) -> Vec<f64> {
     }
     let drift = |c: usize| match (n, c) {
         (2, _) => means[1] - means[0],
-        // the parabola through the first three means, or the last three
+        // parabola through the first three means, or the last three
         (_, 0) => -1.5 * means[0] + 2.0 * means[1] - 0.5 * means[2],
         (_, c) if c == n - 1 => 1.5 * means[c] - 2.0 * means[c - 1] + 0.5 * means[c - 2],
         (_, c) => 0.5 * (means[c + 1] - means[c - 1]),
@@ -410,7 +422,7 @@ fn add(sum: &mut [f64], own: &[f64]) {
     sum.iter_mut().zip(own).for_each(|(sum, value)| *sum += value);
 }
 
-/// Takes the mean out of one cycle, and the straight line by which the signal drifts over it; gives the mean.
+/// Removes the mean of one cycle, and the linear drift of the signal over it; returns the mean.
 fn levelled(x: &mut [f64], drift: Option<&f64>) -> f64 {
     let mean = mean(x);
     let Some(drift) = drift else {
@@ -427,10 +439,12 @@ fn levelled(x: &mut [f64], drift: Option<&f64>) -> f64 {
     mean
 }
 
-/// A signal at the `points` places of a cycle, by cubic (Catmull–Rom) interpolation of its samples `x`.
+/// A signal at the `points` positions of a cycle, by cubic (Catmull–Rom) interpolation of its
+/// samples `x`.
 ///
-/// A step is one sample but for a fraction, so that the place between two samples is the same but for a slow drift: only where
-/// that passes a sample, runs of equal whole steps end.
+/// A step differs from one sample by a small fraction only, so the position between two samples
+/// changes slowly. Points are processed in runs of equal whole steps; a run ends only where the
+/// position passes a sample.
 fn resample(x: &[f64], &Place { from, step, .. }: &Place, points: usize, to: &mut Vec<f64>) {
     let drift = step - 1.0;
     to.clear();
@@ -441,14 +455,14 @@ fn resample(x: &[f64], &Place { from, step, .. }: &Place, points: usize, to: &mu
         let i = at as usize;
         let t = at - i as f64;
         let run = if drift > 0.0 { (1.0 - t) / drift } else { t / -drift };
-        // the first point may lie on a sample and drift down from it
+        // the first point may lie on a sample and drift below it
         let run = (run.min(points as f64) as usize).clamp(1, points - done);
         cubic(&x[i - 1..i + run + 2], t, drift, &mut to[done..done + run]);
         done += run;
     }
 }
 
-/// Values between the second and third of each four samples in a row, at t, t + `drift`, …
+/// Values between the second and third of each four consecutive samples, at t, t + `drift`, …
 fn cubic(x: &[f64], t: f64, drift: f64, to: &mut [f64]) {
     let n = to.len();
     let [p0, p1, p2, p3] = [0, 1, 2, 3].map(|i| &x[i..][..n]);
@@ -468,7 +482,7 @@ fn cubic(x: &[f64], t: f64, drift: f64, to: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// A cubic goes through a parabola exactly, wherever runs end.
+    /// A cubic reproduces a parabola exactly, wherever the runs end.
     #[test]
     fn a_parabola_comes_back_at_any_step() {
         let parabola = |at: f64| 3.0 - 2.0 * at + 0.25 * at * at;

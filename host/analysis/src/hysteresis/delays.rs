@@ -1,6 +1,7 @@
-//! Signals brought into step: what each channel's decoder and converter cost is taken out.
+//! Aligns signals in time: removes the delays of each channel's decoder and converter.
 
-/// The signals with their delays (s) against one another taken out: all are as late as the least late one afterwards.
+/// Removes the relative delays (s) of the signals: afterwards all have the delay of the least
+/// delayed one.
 pub fn in_step<const N: usize>(signals: [Vec<f64>; N], delays_s: [f64; N], fs_hz: f64) -> [Vec<f64>; N] {
     let least = delays_s.into_iter().fold(f64::INFINITY, f64::min);
     let mut delays = delays_s.into_iter();
@@ -10,12 +11,13 @@ pub fn in_step<const N: usize>(signals: [Vec<f64>; N], delays_s: [f64; N], fs_hz
     })
 }
 
-/// The signal `samples` earlier (not negative), by straight lines between samples: loops live far below the
-/// sampling rate. The last value is held.
+/// The signal `samples` earlier (not negative), by linear interpolation between samples, which
+/// suffices because loop frequencies lie far below the sampling rate. The last value is repeated at
+/// the end.
 fn advance(mut signal: Vec<f64>, samples: f64) -> Vec<f64> {
     let Some(last) = signal.last().copied().filter(|_| samples > 0.0) else { return signal };
     let (whole, share) = (samples.floor() as usize, samples.fract());
-    // only what lies ahead is read, so it can be done in place
+    // only later samples are read, so it works in place
     let good = signal.len().saturating_sub(whole + 1);
     for i in 0..good {
         signal[i] = signal[i + whole] * (1.0 - share) + signal[i + whole + 1] * share;

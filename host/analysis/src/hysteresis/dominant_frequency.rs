@@ -1,8 +1,10 @@
 //! The strongest frequency of a record of any length.
 //!
-//! Records after an impact begin at the onset, so that their lengths are as they fall. A transform of such a length takes several times as
-//! long as one of a length with small factors, and its plan as long again. Lengths with small factors are transformed as they are; others are padded with zeros
-//! to the next such length, which shows where the spectrum is high, and the record's own lines are summed there alone, one by one.
+//! Records after an impact begin at the onset of motion, so their lengths are arbitrary. An FFT of
+//! such a length takes several times as long as one of a length with small prime factors, and
+//! planning it takes as long again. Lengths with small factors are transformed directly. Other
+//! records are zero-padded to the next such length to find where the spectrum is high; the lines of
+//! the original length are then computed only there, each by direct summation.
 
 use super::line_sums::{line_sum, turns};
 use crate::transforms::forward;
@@ -10,20 +12,22 @@ use num_complex::Complex;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Peaks of the padded spectrum below this fraction of the highest are not looked at: between two lines a Hann-windowed tone loses 28 % of
-/// its power at the most.
+/// Peaks of the padded spectrum below this fraction of the highest are ignored: a Hann-windowed
+/// tone between two lines loses at most 28 % of its power.
 const NEAR_HIGHEST: f64 = 0.25;
-/// Peaks that are looked at one by one; with more the record is noise, and all of its lines are.
+/// Maximum number of peaks that are examined one by one; with more, the record is noise, and all of
+/// its lines are computed.
 const PEAKS: usize = 6;
 
-/// The strongest frequency (Hz) above two periods of the record, from a Hann-windowed spectrum with parabolic refinement.
+/// The strongest frequency (Hz) above two periods of the record, from a Hann-windowed spectrum with
+/// parabolic refinement.
 pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
     let n = x.len();
     if n < 32 {
         return None;
     }
     let windowed = windowed(x);
-    // some power of two is among them
+    // the range contains a power of two
     let smooth = (n..=2 * n).find(|size| only_small_factors(*size))?;
     let strongest = if smooth == n { None } else { Strongest::near_peaks(&windowed, smooth) };
     let strongest = match strongest {
@@ -33,8 +37,8 @@ pub(super) fn dominant_frequency(x: &[f64], fs_hz: f64) -> Option<f64> {
     strongest.frequency(fs_hz / n as f64)
 }
 
-/// A signal without the straight line from the mean of its first quarter to that of its last: a drift has power at low
-/// frequencies.
+/// Removes the straight line through the means of the first and last quarters: a drift has power at
+/// low frequencies.
 pub(super) fn level(x: &[f64]) -> Vec<f64> {
     let n = x.len();
     let quarter = (n / 4).max(1).min(n);
@@ -44,7 +48,7 @@ pub(super) fn level(x: &[f64]) -> Vec<f64> {
     x.iter().enumerate().map(|(i, v)| v - first - slope * (i as f64 - 0.5 * quarter as f64)).collect()
 }
 
-/// Without its mean, through a Hann window.
+/// Removes the mean and applies a Hann window.
 fn windowed(x: &[f64]) -> Vec<f64> {
     let n = x.len();
     let mean = x.iter().sum::<f64>() / n as f64;
@@ -53,7 +57,8 @@ fn windowed(x: &[f64]) -> Vec<f64> {
     x.iter().zip(&turns).map(|(v, turn)| (v - mean) * (0.5 - 0.5 * (half * turn).re)).collect()
 }
 
-/// Whether 2, 3, 5 and 7 are all its prime factors, 2 among them: lengths that are transformed quickly.
+/// Whether the length is even and has no prime factors other than 2, 3, 5 and 7: such lengths are
+/// transformed quickly.
 fn only_small_factors(size: usize) -> bool {
     let rest = [2, 3, 5, 7].into_iter().fold(size, |mut rest, factor| {
         while rest.is_multiple_of(factor) {
@@ -68,7 +73,7 @@ fn only_small_factors(size: usize) -> bool {
 #[derive(Debug, PartialEq)]
 struct Strongest {
     line: usize,
-    /// Power of the line before it, of it, and of the line after it.
+    /// Power of the line before it, of the line itself, and of the line after it.
     power: [f64; 3],
 }
 
@@ -80,16 +85,17 @@ impl Strongest {
         Some(Strongest { line, power: [power[line - 1], power[line], power[line + 1]] })
     }
 
-    /// From the lines around the peaks of the record padded to `size`; none where there are too many of them.
+    /// From the lines around the peaks of the record padded to `size`; `None` if there are too many
+    /// peaks.
     fn near_peaks(windowed: &[f64], size: usize) -> Option<Strongest> {
         let n = windowed.len();
         let mut padded = windowed.to_vec();
         padded.resize(size, 0.0);
         let power = powers(&mut padded)?;
         let last = n / 2 - 1;
-        // a line of the record between two of the padded spectrum
+        // a line of the record's own spectrum that falls between two of the padded one
         let line_at = |at: usize| ((at as f64 * n as f64 / size as f64).round() as usize).clamp(2, last);
-        // the first line that counts is at or a little above the padded spectrum's
+        // the first valid line is at or slightly above that of the padded spectrum
         let from = 2;
         let highest = power[from..].iter().copied().fold(0.0, f64::max);
         let level = NEAR_HIGHEST * highest;
@@ -108,7 +114,7 @@ impl Strongest {
         let mut best: Option<(usize, f64)> = None;
         for peak in peaks {
             let mut line = line_at(peak);
-            // uphill: the peak's own line is the highest of its neighbours
+            // climb until the line is higher than its neighbours
             while let Some(higher) = [line - 1, line + 1]
                 .into_iter()
                 .find(|other| (2..=last).contains(other) && of(*other) > of(line))
@@ -124,7 +130,8 @@ impl Strongest {
         Some(Strongest { line, power: [of(line - 1), of(line), of(line + 1)] })
     }
 
-    /// Refined by the parabola through the logarithms; lines are `step_hz` apart. None where nothing moves.
+    /// Refined by the parabola through the logarithms; lines are `step_hz` apart. `None` if nothing
+    /// moves.
     fn frequency(&self, step_hz: f64) -> Option<f64> {
         if self.power[1] <= f64::MIN_POSITIVE {
             return None;
@@ -136,7 +143,7 @@ impl Strongest {
     }
 }
 
-/// |X|² of every line; the signal is spent.
+/// |X|² of every line; overwrites the signal.
 fn powers(signal: &mut [f64]) -> Option<Vec<f64>> {
     let fft = forward(signal.len());
     let mut spectrum = fft.make_output_vec();
@@ -144,7 +151,7 @@ fn powers(signal: &mut [f64]) -> Option<Vec<f64>> {
     Some(spectrum.iter().map(Complex::norm_sqr).collect())
 }
 
-/// |X|² of one line, by its sum.
+/// |X|² of one line, by direct summation.
 fn line_power(signal: &[f64], line: usize) -> f64 {
     line_sum(signal, -TAU * line as f64 / signal.len() as f64).norm_sqr()
 }
@@ -170,8 +177,8 @@ mod tests {
             .collect()
     }
 
-    /// The lines around the peaks say what all lines say, whatever the length, for one mode, two that are nearly as strong, a broad one, and
-    /// modes in noise.
+    /// The lines around the peaks give the same result as all lines, for any length, for one mode,
+    /// two of nearly equal strength, a broad one, and modes in noise.
     #[test]
     fn a_padded_transform_finds_the_records_own_strongest_line() {
         let cases: [&[[f64; 3]]; 5] = [
@@ -192,13 +199,13 @@ mod tests {
                     met += 1;
                     assert_eq!(near.line, whole.line, "{modes:?}, {n} samples, noise {noise}");
                     for (own, other) in near.power.iter().zip(&whole.power) {
-                        // rounding of both transforms, against the highest line
+                        // rounding of both transforms, relative to the highest line
                         assert!((own - other).abs() < 1e-11 * whole.power[1], "{near:?} {whole:?}");
                     }
                 }
             }
         }
-        // the others have more peaks than are worth a look each
+        // the other records have too many peaks to examine each
         assert!(met > 50, "{met} of 75");
     }
 
@@ -212,7 +219,7 @@ mod tests {
     fn a_tone_is_told_to_a_small_part_of_a_line_and_silence_is_none() {
         for n in [20_480, 20_483] {
             let found = dominant_frequency(&decay(n, &[[208.3, 0.0, 2.0]], 0.0, 0), FS_HZ).expect("a tone");
-            // the parabola's own error for a Hann window
+            // the interpolation error of the parabola for a Hann window
             assert!((found - 208.3).abs() < 0.05 * FS_HZ / n as f64, "{found}");
             assert_eq!(dominant_frequency(&vec![0.0; n], FS_HZ), None);
         }

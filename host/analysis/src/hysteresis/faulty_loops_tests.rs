@@ -1,7 +1,8 @@
-//! What used to pass in silence, each on a few hundred loops: how often it is found where it is, and how often where it is not.
+//! Detection rates of faults that used to go unnoticed, each on a few hundred loops: how often a
+//! fault is found where it is present, and how often where it is not.
 //!
-//! Loops of all kinds: contacts of 60 to 600 N/µm, 30 to 400 Hz, 51.2 and 10.24 kHz, stuck and in gross slip, noise as the rig's
-//! sensors have it, channels that come late by what is declared.
+//! Loops of all kinds: contacts of 60 to 600 N/µm, 30 to 400 Hz, 51.2 and 10.24 kHz, stuck and in
+//! gross slip, with the noise of the rig's sensors and channels whose delays are declared.
 //!
 //!     cargo test --release -p jointrig-analysis faulty_loops -- --ignored --nocapture
 
@@ -15,7 +16,7 @@ struct Fault {
     name: &'static str,
     make: fn(&mut Xoshiro256PlusPlus) -> Bench,
     found: fn(&Bench, &LoopAnalysis) -> bool,
-    /// Part that must be found.
+    /// Fraction that must be found.
     least: f64,
 }
 
@@ -39,7 +40,7 @@ fn faults() -> Vec<Fault> {
     vec![
         Fault {
             name: "force late by 20 µs in gross slip",
-            // a fifth of a sample at 10.24 kHz is no delay that a corner shows
+            // a fifth of a sample at 10.24 kHz is too short a delay to show in a corner
             make: |rng| Bench {
                 late_s: 20e-6,
                 fs_hz: 51_200.0,
@@ -71,7 +72,7 @@ fn faults() -> Vec<Fault> {
             name: "microslip at small energy",
             make: |rng| {
                 let bench = stuck(rng);
-                // a quarter to a half of what makes the last slider go
+                // a quarter to a half of the amplitude at which the last slider slips
                 let amplitude_m = bench.amplitude_m;
                 let limit_n = bench.stiffness * amplitude_m / (1.9 * between(rng, 0.25, 0.5));
                 Bench { law: Law::Sliders { limits: spread(20, 0.9), limit_n, along: 0.0 }, ..bench }
@@ -98,7 +99,7 @@ fn faults() -> Vec<Fault> {
             name: "a Dahl contact's flank",
             make: |rng| {
                 let bench = slipping(rng, true);
-                // the first fifth of a bent flank needs samples to be bent in
+                // the first fifth of a bent flank needs enough samples to show its curvature
                 let frequency_hz = bench.frequency_hz.min(bench.fs_hz / 200.0);
                 Bench {
                     law: Law::Dahl { limit_n: bench.stiffness * bench.amplitude_m / 4.0 },
@@ -159,7 +160,7 @@ fn faults() -> Vec<Fault> {
                 let tracked = f.findings.iter().any(|f| {
                     matches!(f, LoopFinding::FrequencyOff { from_hz, to_hz, .. } if ((to_hz / from_hz - 1.0) / b.drift - 1.0).abs() < 0.1)
                 });
-                // and its shape is what it would have been
+                // and its shape must be that without the fault
                 let slips = !matches!(b.law, Law::Linear);
                 tracked && slips == matches!(f.shape, Shape::GrossSlip)
             },
@@ -168,7 +169,7 @@ fn faults() -> Vec<Fault> {
     ]
 }
 
-/// Clean loops on which each kind of finding was made.
+/// Clean loops on which each kind of finding was reported.
 fn false_findings(count: u64) -> Vec<(&'static str, usize)> {
     let kinds = [
         "reversed",
@@ -212,7 +213,7 @@ fn false_findings(count: u64) -> Vec<(&'static str, usize)> {
             );
         }
         counts[6] += usize::from(microslip);
-        // a flank of a few samples has no slope at all
+        // a flank of only a few samples has no usable slope
         let off = found.k_t_n_per_m.is_some() && !k_t_within(&bench, &found, 0.04);
         counts[7] += usize::from(off);
         if off {

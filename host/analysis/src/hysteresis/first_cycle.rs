@@ -1,4 +1,4 @@
-//! The first cycle of a hit's decay: its slope, and what an arm's inertia would add to it.
+//! The first cycle of a hit's decay: its slope, and the correction that an arm's inertia would add.
 
 use super::analyse::decay_of;
 use super::correction::{Correction, rate};
@@ -7,37 +7,41 @@ use super::loops::slope;
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::{HysteresisError, Shape};
 
-/// Cycles of a decay that are told: later ones drown, or carry the lowest modes alone.
+/// Number of cycles of a decay that are reported: later ones are buried in noise, or contain only
+/// the lowest modes.
 pub const DECAY_CYCLES: usize = 8;
 
-/// What one hit's first cycle says.
+/// Results of one hit's first cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FirstCycle {
     /// Least-squares slope of T on Δx over the first cycle, N/m.
     pub slope_n_per_m: f64,
-    /// How much of T that line explains, 0…1.
+    /// Coefficient of determination R² of that line, 0…1.
     pub r_squared: f64,
     /// Half the swing of Δx, m.
     pub amplitude_m: f64,
     /// Frequency of the decay's main mode, Hz.
     pub frequency_hz: f64,
-    /// Phase by which Δx lags T over the first cycle, degrees: of the same samples as slope and amplitude.
+    /// Phase by which Δx lags T over the first cycle, degrees; from the same samples as slope and
+    /// amplitude.
     pub phase_deg: f64,
-    /// The shape.
+    /// Shape of the loop.
     pub shape: Shape,
-    /// Samples of the first cycle: the first, and the first after it.
+    /// Sample range of the first cycle: its first sample, and the first sample after it.
     pub cycle: [usize; 2],
-    /// Least-squares slope of specimen B's acceleration on Δx over it, 1/s²: what the arm's inertia adds per kg.
+    /// Least-squares slope of specimen B's acceleration on Δx over it, 1/s²: the correction per kg
+    /// of the arm's effective mass.
     pub acceleration_per_m: f64,
     /// The first cycles of the decay, at most [`DECAY_CYCLES`].
     pub decay: Vec<DecayCycle>,
 }
 
 impl FirstCycle {
-    /// From the velocities of specimens A and B (m/s) and the load cells' sum (N) after a hit, in step.
+    /// From the velocities of specimens A and B (m/s) and the load cells' sum (N) after a hit,
+    /// aligned in time.
     ///
     /// # Errors
-    /// The signals hold no whole cycle, or are no numbers.
+    /// The signals hold no whole cycle, or contain values that are not finite.
     pub fn of(fs_hz: f64, [a, b]: [Vec<f64>; 2], force_n: Vec<f64>) -> Result<Self, HysteresisError> {
         let record = HysteresisRecord {
             fs_hz,
@@ -67,7 +71,8 @@ impl FirstCycle {
         })
     }
 
-    /// The slope with the force at the contact in place of T, N/m: a least-squares slope is linear in the force.
+    /// The slope with the force at the contact instead of T, N/m; exact because a least-squares
+    /// slope is linear in the force.
     pub fn corrected_slope(&self, by: &Correction) -> f64 {
         (1.0 + by.parallel_path) * self.slope_n_per_m + by.effective_mass_kg * self.acceleration_per_m
     }
@@ -78,7 +83,8 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Two modes of which one is missing in the force, as beside a hidden resonance: Δx turns against T from cycle to cycle.
+    /// Two modes, one of which is missing in the force, as near a hidden resonance: the phase of Δx
+    /// relative to T changes from cycle to cycle.
     #[test]
     fn everything_that_is_told_is_of_the_first_cycle() {
         let fs_hz = 51_200.0;
@@ -100,7 +106,7 @@ mod tests {
         assert_eq!(found.amplitude_m.to_bits(), one.amplitude_m.to_bits());
     }
 
-    /// What is not told of a long decay changes nothing of what is.
+    /// The unreported part of a long decay does not affect the reported values.
     #[test]
     fn the_first_cycles_are_the_same_whatever_is_told_of_later_ones() {
         let fs_hz = 51_200.0;

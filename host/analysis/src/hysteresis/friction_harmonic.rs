@@ -1,24 +1,27 @@
-//! What dissipates in a loop that looks like a straight line or a thin ellipse: friction or a dashpot.
+//! Source of dissipation in a loop that looks like a straight line or a thin ellipse: friction or a
+//! dashpot.
 //!
-//! Under Δx = X cos θ a dashpot gives a force along −sin θ and nothing else. A contact that begins to slip gives −sin²θ sgn(sin θ), whose
-//! third harmonic is a fifth of its fundamental with the other sign, and nearly so for any law of microslip. So the third harmonic of T
-//! in quadrature tells microslip from damping at energies where the loop's residual from an ellipse is still lost in what
-//! instruments may bend.
+//! Under Δx = X cos θ a dashpot gives a force along −sin θ only. A contact that begins to slip
+//! gives −sin²θ sgn(sin θ), whose third harmonic is a fifth of its fundamental with the opposite
+//! sign, and nearly so for any law of microslip. The quadrature part of the third harmonic of T
+//! therefore distinguishes microslip from damping at energies where the loop's residual from an
+//! ellipse is still within the nonlinearity of the instruments.
 
 use super::harmonics::Harmonics;
 use num_complex::Complex;
 use serde::Serialize;
 
-/// A scatter needs some cycles.
+/// Fewest cycles from which a scatter is estimated.
 const FEWEST_CYCLES: usize = 4;
 
-/// The third harmonic counts from so many of its standard deviations on,
+/// The third harmonic counts if it exceeds this many of its standard deviations,
 const SIGNIFICANT: f64 = 5.0;
 
-/// and from this part of the fundamental on,
+/// and this fraction of the fundamental,
 const LEAST: f64 = 4e-4;
 
-/// if friction explains this part of what is dissipated, or more. A dashpot alone has 0.
+/// and if friction explains at least this fraction of the dissipation. The fraction is 0 for a
+/// dashpot alone.
 const SHARE: f64 = 0.3;
 
 /// Quadratures of T against Δx, from cycle to cycle.
@@ -28,14 +31,16 @@ pub struct Quadratures {
     pub first: f64,
     /// Its standard deviation.
     pub first_std: f64,
-    /// Quadrature of T at the third harmonic over |T₁|; that of the stiffness on Δx₃ is taken off.
+    /// Quadrature of T at the third harmonic over |T₁|, without the contribution of the stiffness
+    /// acting on Δx₃.
     pub third: f64,
     /// Its standard deviation.
     pub third_std: f64,
 }
 
 impl Quadratures {
-    /// Of the harmonics of the average cycle and of each; none for few, or where nothing moves.
+    /// From the harmonics of the average cycle and of each cycle; `None` with too few cycles, or if
+    /// nothing moves.
     pub(super) fn of(mean: &Harmonics, cycles: &[Harmonics]) -> Option<Self> {
         let ([x1, _], [t1, _]) = (mean.displacement, mean.force);
         let turn = Complex::from_polar(1.0, -x1.arg());
@@ -43,7 +48,7 @@ impl Quadratures {
         if !stiffness.is_finite() || force <= 0.0 {
             return None;
         }
-        // both noises count: that of Δx, raised by integration, is the larger one
+        // both noises count; that of Δx is the larger because integration amplifies it
         let quadratures = |own: &Harmonics| {
             let ([x1, x3], [t1, t3]) = (own.displacement, own.force);
             [((t1 - x1 * stiffness) * turn).im / force, ((t3 - x3 * stiffness) * cube).im / force]
@@ -62,12 +67,12 @@ impl Quadratures {
         Some(Self { first, first_std, third, third_std })
     }
 
-    /// The part of the dissipation that friction explains: 1 for microslip, 0 for a dashpot.
+    /// The fraction of the dissipation that friction explains: 1 for microslip, 0 for a dashpot.
     pub fn friction_share(&self) -> f64 {
         -5.0 * self.third / self.first
     }
 
-    /// Whether something slips, beyond doubt.
+    /// Whether slip is significant.
     pub fn slips(&self) -> bool {
         self.third < -LEAST.max(SIGNIFICANT * self.third_std)
             && self.first > 0.0

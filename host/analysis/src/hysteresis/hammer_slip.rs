@@ -1,63 +1,72 @@
-//! Whether the contact slips under the hammer: told from hits of different force in the same cell.
+//! Detects whether the contact slips under the hammer, by comparing hits of different force in the
+//! same cell.
 //!
-//! Nothing in a linear structure depends on how hard it is hit. However many modes beat in a decay, and whatever hides between the
-//! measured spots: T, v_A and v_B per newton of the hammer are the same from hit to hit. A contact that slips cuts off what goes beyond
-//! its friction, and all three change with the force. A hammer's own scatter of two per cent is enough to see that,
-//! because the hits of one cell share everything else: place, aim and direction.
+//! The response of a linear structure is proportional to the force. However many modes beat in a
+//! decay, and whatever resonance hides between the measured points, T, v_A and v_B per newton of
+//! hammer force are the same from hit to hit. A contact that slips limits the force to its
+//! friction, so all three change with the force. A hammer's own scatter of two per cent is enough
+//! to see that, because the hits of one cell share everything else: place, aim and direction.
 //!
-//! So d ln(response per newton) / d ln(force) is estimated from the differences of hits within each cell, band by band and signal by
-//! signal, against the scatter that is left: as a ratio of variances, which is one in the mean while nothing slips. No model of the
-//! structure, no stiffness and no noise level is assumed. A plan that makes every second hit softer (`force.softer`) tells it ten times more
-//! finely than a hammer's own scatter.
+//! So d ln(response per newton) / d ln(force) is estimated from the differences of hits within each
+//! cell, separately for each band and signal, and compared with the remaining scatter as a ratio of
+//! variances, whose mean is one while nothing slips. No model of the structure, no stiffness and no
+//! noise level is assumed. A plan that makes every second hit softer (`force.softer`) resolves it
+//! ten times more finely than a hammer's own scatter.
 
 use super::hit_response::HitResponse;
 use num_complex::Complex;
 use serde::Serialize;
 
-/// Bands in which responses are compared, Hz: in each, the lines count by their strength.
+/// Bands in which responses are compared, Hz; within each, the lines are weighted by their
+/// strength.
 const BANDS_HZ: [[f64; 2]; 4] = [[60.0, 150.0], [150.0, 250.0], [250.0, 400.0], [400.0, 700.0]];
 
-/// T, v_A, v_B, and v_A − v_B: slip is in the last one first.
+/// T, v_A, v_B, and v_A − v_B: slip shows first in the last one.
 const SIGNALS: usize = 4;
 
-/// Fewer differences between hits than this say nothing about one place of impact.
+/// With fewer differences between hits than this, one place of impact is not evaluated.
 const FEWEST_OF_IMPACT: usize = 3;
 
-/// Fewer over all places say nothing at all.
+/// With fewer over all places, no verdict is given.
 const FEWEST: usize = 12;
 
-/// What goes with the force is no accident where chance alone would give it this rarely: one campaign of a thousand that stick.
+/// A dependence on force is significant if chance alone would give it with less than this
+/// probability: one of a thousand campaigns without slip.
 const NO_ACCIDENT: f64 = 1e-3;
 
-/// Nor is it slip below this change of T per newton: the hammer strikes when some 0.3 % of the last hit's motion is left, and hits of two forces that
-/// differ by a third follow one another in the same order, so that up to a per cent of it goes with the force. Stuck campaigns had up to 0.6 %.
+/// A change of T per newton below this does not count as slip: the hammer strikes when some 0.3 %
+/// of the last hit's motion is left, and hits of two forces that differ by a third follow one
+/// another in the same order, so that up to one per cent of the change follows the force. Campaigns
+/// without slip had up to 0.6 %.
 const LEFT_BEHIND: f64 = 0.015;
 
-/// Standard deviations from which on one change is not scatter.
+/// Standard deviations above which a single change is not scatter.
 const CERTAIN: f64 = 4.0;
 
-/// Sticking is said only where T per newton is known not to change by more than this part for each part of force: microslip that changes T by as
-/// much changes k_T by more than its interval. A contact that slips a lot stands elsewhere after each hit, and answers the next one differently, so
-/// that the scatter hides what goes with the force.
+/// Sticking is reported only if T per newton is known to change by less than this per relative
+/// change of force: microslip that changes T by as much changes k_T by more than its interval. A
+/// contact that slips strongly settles in a different position after each hit and responds
+/// differently to the next one, so that the scatter hides the dependence on force.
 const MUCH: f64 = 0.03;
 
-/// With a standard deviation above this such a change would not show.
+/// With a standard deviation above this, such a change would not show.
 const TOO_COARSE: f64 = MUCH;
 
-/// A larger change is still no sign of slip where chance alone gives as much in one of so many campaigns that stick: a place of impact with few hits
-/// tells its own scatter poorly.
+/// A change larger than that does not count as slip if chance alone gives as much with more than
+/// this probability in campaigns without slip: with few hits at a place of impact, its scatter is
+/// poorly known.
 const BY_CHANCE: f64 = 0.05;
 
 /// The hits of one cell: one place of impact, one aim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellHits<'a> {
-    /// The impact's name: cells of the same impact are expected to answer alike.
+    /// The impact's name: cells of the same impact are expected to respond alike.
     pub impact: &'a str,
     /// Its kept hits.
     pub hits: Vec<&'a HitResponse>,
 }
 
-/// What the hits say of slip.
+/// Verdict on slip from all hits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HammerSlip {
@@ -65,28 +74,29 @@ pub enum HammerSlip {
     Slips(Scaling),
     /// It does not, and the hits differ enough to have shown it.
     Sticks(Scaling),
-    /// The hits do not say.
+    /// The hits do not allow a verdict.
     CannotTell(Unclear),
 }
 
-/// How the response per newton goes with the hammer's force.
+/// How the response per newton depends on the hammer's force.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Scaling {
-    /// d ln(T/F) / d ln F where T is best known, its magnitude: 0 for a linear structure; 1 if 1 % more force gives 1 % less T per newton.
+    /// Magnitude of d ln(T/F) / d ln F in the band where T is best known: 0 for a linear structure;
+    /// 1 if 1 % more force gives 1 % less T per newton.
     pub change_per_force: f64,
-    /// Standard deviation of either part of it.
+    /// Standard deviation of its real and imaginary parts, each.
     pub std: f64,
-    /// How probable changes as large as the largest are in a contact that sticks.
+    /// Probability of changes as large as the largest in a contact that sticks.
     pub chance: f64,
     /// Hits compared.
     pub hits: usize,
-    /// Standard deviation of the hammer's impulse within the cells, over itself.
+    /// Relative standard deviation of the hammer's impulse within the cells.
     pub force_scatter: f64,
-    /// Largest |T| in the mean over the hits, N.
+    /// Largest |T|, averaged over the hits, N.
     pub peak_tangential_n: f64,
 }
 
-/// Why the hits do not say it.
+/// Why the hits do not allow a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unclear {
@@ -94,20 +104,21 @@ pub enum Unclear {
     TooFewHits {
         /// Hits beyond the first of each cell.
         differences: usize,
-        /// So many are needed.
+        /// Number needed.
         needed: usize,
     },
-    /// The hits are too alike in force, or too noisy, for the difference that slip would make.
+    /// The hits are too similar in force, or too noisy, to show the difference that slip would
+    /// make.
     TooAlike {
-        /// Standard deviation of the hammer's impulse within the cells, over itself.
+        /// Relative standard deviation of the hammer's impulse within the cells.
         force_scatter: f64,
-        /// Standard deviation with which d ln(T/F) / d ln F comes out.
+        /// Standard deviation of the estimated d ln(T/F) / d ln F.
         std: f64,
     },
 }
 
 impl HammerSlip {
-    /// Slips, sticks, or none where the hits do not say.
+    /// Whether it slips; `None` if the hits do not allow a verdict.
     pub fn found(&self) -> Option<bool> {
         match self {
             Self::Slips(_) => Some(true),
@@ -132,7 +143,7 @@ impl HammerSlip {
         }
         let features = impacts[0].features.len();
         let least = (0..features).map(|j| chance(impacts.iter().map(|i| (&i.features[j], i.freedom()))));
-        // any of the features may be the one
+        // corrects for testing all features: any of them may be the most significant one
         let chance = (features as f64 * least.fold(1.0, f64::min)).min(1.0);
         let (squares, hits) =
             impacts.iter().fold((0.0, 0), |(s, n), impact| (s + impact.squares, n + impact.hits));
@@ -157,8 +168,10 @@ impl HammerSlip {
     }
 }
 
-/// How probable changes as large as these are where nothing goes with the force: of one feature over all impacts, each with its hits' freedom ν.
-/// A change over its scatter is F(2, 2ν), whose tail is (1 + F/ν)^−ν; −2 Σ ln of n such probabilities is χ² with 2n degrees of freedom (Fisher).
+/// Probability of changes as large as these if nothing depends on force: of one feature over all
+/// impacts, each with the degrees of freedom ν of its hits. A change over its scatter follows F(2,
+/// 2ν), whose tail is (1 + F/ν)^−ν; −2 Σ ln of n such probabilities follows χ² with 2n degrees of
+/// freedom (Fisher).
 fn chance<'a>(slopes: impl Iterator<Item = (&'a Slope, usize)>) -> f64 {
     let (mut half, mut count) = (0.0, 0);
     for (slope, freedom) in slopes {
@@ -174,7 +187,8 @@ fn chance<'a>(slopes: impl Iterator<Item = (&'a Slope, usize)>) -> f64 {
     if half.is_finite() { (-half).exp() * sum } else { 0.0 }
 }
 
-/// d ln(T/F) / d ln F over all impacts in the band where it is best known, and the standard deviation of its parts.
+/// d ln(T/F) / d ln F over all impacts in the band where it is best known, and the standard
+/// deviation of its parts.
 fn tangential(impacts: &[Impact]) -> (f64, f64) {
     let of_band = |band: usize| {
         let (mut sum, mut weights) = (Complex::default(), 0.0);
@@ -205,15 +219,16 @@ struct Impact {
     peak_tangential_n: f64,
 }
 
-/// Change of one band of one signal with ln(force).
+/// Change of one signal in one band with ln(force).
 struct Slope {
     value: Complex<f64>,
-    /// Of either part.
+    /// Variance of the real and imaginary parts, each.
     variance: f64,
 }
 
 impl Slope {
-    /// Variance that goes with the force over that which does not: 1 in the mean for a linear structure.
+    /// Variance that depends on force over variance that does not: 1 in the mean for a linear
+    /// structure.
     fn ratio(&self) -> f64 {
         let change = self.value.norm_sqr();
         if change > 0.0 { change / (2.0 * self.variance) } else { 0.0 }
@@ -224,7 +239,7 @@ impl Impact {
     fn of<'a>(cells: impl Iterator<Item = &'a CellHits<'a>>) -> Self {
         let cells: Vec<Vec<&HitResponse>> =
             cells.map(|cell| alike(&cell.hits)).filter(|own| own.len() > 1).collect();
-        // what is left of each hit after its cell's mean is taken off: of ln(impulse), and of every feature
+        // deviations of each hit from its cell's mean: of ln(impulse), and of every feature
         let (mut forces, mut features) = (Vec::new(), vec![Vec::new(); SIGNALS * BANDS_HZ.len()]);
         let (mut hits, mut differences, mut peak_tangential_n) = (0, 0, 0.0);
         for (i, own) in cells.iter().enumerate() {
@@ -255,14 +270,14 @@ impl Impact {
         Self { features, hits, squares, differences, peak_tangential_n }
     }
 
-    /// Largest d ln(T/F) / d ln F of all bands, where it is no scatter.
+    /// Largest significant d ln(T/F) / d ln F of all bands.
     fn largest_of_tangential(&self) -> f64 {
         let of_t = self.features[..BANDS_HZ.len()].iter();
         let certain = of_t.filter(|slope| slope.value.norm_sqr() > CERTAIN * CERTAIN * slope.variance);
         certain.map(|slope| slope.value.norm()).fold(0.0, f64::max)
     }
 
-    /// Differences that are left when one slope is taken out.
+    /// Degrees of freedom left after one slope is fitted.
     fn freedom(&self) -> usize {
         self.differences.saturating_sub(1)
     }
@@ -277,8 +292,10 @@ fn alike<'a>(hits: &[&'a HitResponse]) -> Vec<&'a HitResponse> {
     hits.iter().filter(|hit| same_lines(hit, hits[0])).copied().collect()
 }
 
-/// By how much each hit of a cell differs from their mean in one band of one signal: the projection on what is `usual` at this impact, over
-/// that. Hits of other cells say what is usual: a hit's own noise would be larger per newton the softer it is, and look like slip.
+/// Deviation of each hit of a cell from the cell's mean in one band of one signal: the projection
+/// on the `usual` response at this impact, normalised by it. The usual response comes from hits of
+/// other cells: otherwise a hit's own noise, which is larger per newton the softer the hit, would
+/// look like slip.
 fn apart(
     hits: &[&HitResponse],
     usual: &[&HitResponse],
@@ -314,7 +331,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// Hits of 2 % scatter in force, whose response per newton goes with the force to the power −`power` and scatters by `noise`.
+    /// Hits of 2 % scatter in force, whose response per newton is proportional to force^−`power`
+    /// and scatters by `noise`.
     fn campaign(power: f64, scatter: f64, noise: f64) -> Vec<HitResponse> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -352,9 +370,9 @@ mod tests {
         for (power, scatter, noise, found) in [
             (0.0, 0.02, 1e-3, Some(false)),
             (0.8, 0.02, 1e-3, Some(true)),
-            // each hit finds the contact elsewhere
+            // each hit meets the contact in a different position
             (0.8, 0.02, 8e-3, Some(true)),
-            // hits all alike
+            // hits of equal force
             (0.0, 1e-4, 1e-3, None),
         ] {
             let verdict = verdict(&campaign(power, scatter, noise));

@@ -4,7 +4,7 @@ use super::sums::dot;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Of one signal over one cycle: the amplitude at the fundamental, and at its third multiple.
+/// Amplitudes of one signal over one cycle: at the fundamental, and at its third harmonic.
 pub(super) type Pair = [Complex<f64>; 2];
 
 /// First and third harmonic of one cycle.
@@ -16,14 +16,15 @@ pub(super) struct Harmonics {
     pub force: Pair,
 }
 
-/// Cosine and minus sine once and three times round, for cycles of so many points.
+/// Cosine and negative sine of the first and third harmonic, sampled at the points of a cycle.
 pub(super) struct Wheels([[Vec<f64>; 2]; 2]);
 
 impl Wheels {
     /// For cycles of `points` points.
     pub fn new(points: usize) -> Self {
         let turn = |times: usize, part: fn(f64) -> f64| -> Vec<f64> {
-            // the remainder keeps the angle small, so that a third harmonic is as exact as a first
+            // the remainder keeps the angle small, so the third harmonic is as accurate as the
+            // first
             let angle = |i: usize| TAU * (times * i % points) as f64 / points as f64;
             (0..points).map(|i| 2.0 / points as f64 * part(angle(i))).collect()
         };

@@ -1,19 +1,22 @@
-//! What one hit gives per newton of it, line by line: the ground on which hits of different force are compared.
+//! The response to one hit per newton, line by line: the basis for comparing hits of different
+//! force.
 
 use crate::transforms::forward;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Lines that are looked at, Hz: below, the records' ends cut the motion off; above, little of it passes the contact.
+/// Range of lines used, Hz: below it, the motion is truncated at the ends of the records; above it,
+/// little of it passes the contact.
 pub const LINES_HZ: [f64; 2] = [60.0, 700.0];
 
-/// So much of the record is used, s: slip leaves its mark in the first cycles, and noise adds up after them.
+/// Length of record used, s: slip shows in the first cycles, and noise accumulates after them.
 const LENGTH_S: f64 = 0.3;
 
-/// What comes before the pulse's peak, s.
+/// Time kept before the pulse's peak, s.
 const LEAD_S: f64 = 2e-3;
 
-/// Damping of the exponential window, 1/s: what is left at the cut-off end is a small part, and the same part for every hit.
+/// Decay rate of the exponential window, 1/s: what remains at the truncated end is small, and the
+/// same fraction for every hit.
 const SIGMA_PER_S: f64 = 8.0;
 
 /// T, v_A and v_B.
@@ -28,7 +31,7 @@ pub struct HitSignals<'a> {
     pub hammer_n: &'a [f64],
     /// T (N), v_A and v_B (m/s), of the same length.
     pub contact: [&'a [f64]; SIGNALS],
-    /// How late each of them is against the hammer's force, s.
+    /// Delay of each signal relative to the hammer's force, s.
     pub delay_s: [f64; SIGNALS],
 }
 
@@ -43,21 +46,22 @@ pub struct HitResponse {
     pub peak_tangential_n: f64,
     /// First line, Hz.
     pub first_hz: f64,
-    /// Distance of lines, Hz.
+    /// Spacing of the lines, Hz.
     pub step_hz: f64,
-    /// T (N/N), v_A and v_B (m/s/N) on s = σ + iω.
+    /// T (N/N), v_A and v_B (m/s/N) at s = σ + iω.
     pub per_newton: [Vec<Complex<f64>>; SIGNALS],
 }
 
 impl HitResponse {
-    /// Of one hit; none without a pulse, or with signals of another length.
+    /// From one hit; `None` without a pulse, or if the signals differ in length.
     pub fn of(signals: &HitSignals<'_>) -> Option<Self> {
         let HitSignals { fs_hz, hammer_n, contact, delay_s } = *signals;
         if contact.iter().any(|x| x.len() != hammer_n.len()) || !(fs_hz.is_finite() && fs_hz > 0.0) {
             return None;
         }
         let peak = (0..hammer_n.len()).max_by(|&a, &b| hammer_n[a].abs().total_cmp(&hammer_n[b].abs()))?;
-        // the cut lies as far behind the pulse in every hit, so that what it takes off is the same part of each
+        // the truncation is at the same distance after the pulse in every hit, so it removes the
+        // same fraction of each
         let from = peak.saturating_sub((LEAD_S * fs_hz).round() as usize);
         let length = ((LENGTH_S * fs_hz) as usize).min(hammer_n.len() - from);
         let size = ((LENGTH_S * fs_hz) as usize).next_power_of_two();
@@ -70,7 +74,8 @@ impl HitResponse {
         }
         let spectrum = |x: &[f64]| -> Option<Vec<Complex<f64>>> {
             let own = &x[from..from + length];
-            // a sensor's offset does not grow with the force: what stayed in would look like slip
+            // a sensor's offset does not scale with the force, so if it remained it would look like
+            // slip
             let rest = mean(&x[x.len() - x.len() / 4..]);
             let mut windowed = vec![0.0; size];
             windowed.iter_mut().zip(own).zip(&window).for_each(|((to, x), w)| *to = (x - rest) * w);

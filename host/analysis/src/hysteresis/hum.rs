@@ -1,7 +1,8 @@
-//! The mains' hum at the loop's own frequency.
+//! Mains hum at the loop's own frequency.
 //!
-//! There it cannot be told from the excitation: it is as steady, and every cycle holds it alike. But hum comes with
-//! harmonics, and those that do not fall on the loop's own stand free in the spectrum of the whole record.
+//! At that frequency hum cannot be distinguished from the excitation: it is as steady, and
+//! identical in every cycle. But hum has harmonics, and those that do not coincide with the loop's
+//! own harmonics are isolated in the spectrum of the whole record.
 
 use super::finding::LoopFinding;
 use super::line_sums::{line_sum, turns};
@@ -11,32 +12,34 @@ use crate::transforms::forward;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// The mains of the world, Hz.
+/// Mains frequencies in use, Hz.
 const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 
-/// Multiples that are looked at.
+/// Number of multiples that are checked.
 const MULTIPLES: usize = 10;
 
-/// The mains wander by so much of their frequency.
+/// Relative variation of the mains frequency.
 const WANDER: f64 = 2e-3;
 
-/// Longest stretch that is looked at, s.
+/// Longest part of the record that is used, s.
 const LONGEST_S: f64 = 4.0;
 
-/// Widths of a line (1/duration) that a Blackman-Harris window needs to tell two lines apart.
+/// Line widths (1/duration) that a Blackman-Harris window needs to separate two lines.
 const APART: f64 = 5.0;
 
-/// A line stands out if its power is this many times the mean of its surroundings: noise alone does once in 10⁷ lines
-/// (F distribution of 2 and 2 `SURROUNDINGS` degrees of freedom; the window correlates neighbours in pairs).
+/// A line stands out if its power is this many times the mean of its surroundings: noise alone
+/// exceeds it once in 10⁷ lines (F distribution of 2 and 2 `SURROUNDINGS` degrees of freedom; the
+/// window correlates neighbours in pairs).
 const STANDS_OUT: f64 = 25.0;
 
-/// Lines on each side that tell what the surroundings are.
+/// Lines on each side that determine the level of the surroundings.
 const SURROUNDINGS: i32 = 24;
 
-/// A frequency lies on a line to this part of a line's width, by which no amplitude changes more.
+/// Tolerance, in line widths, for a frequency to count as lying on a line; it changes no amplitude
+/// by a larger fraction.
 const ON_A_LINE: f64 = 1e-6;
 
-/// Less than this part of the fundamental moves nothing that matters.
+/// Hum below this fraction of the fundamental has no effect worth reporting.
 const MATTERS: f64 = 2e-3;
 
 /// Looks for hum in a record whose loop runs at `frequency_hz`.
@@ -44,7 +47,8 @@ pub(super) fn at_the_loop(record: &HysteresisRecord, frequency_hz: f64) -> Optio
     let samples = record.force_n.len().min((LONGEST_S * record.fs_hz) as usize);
     let line_hz = record.fs_hz / samples as f64;
     let multiple = |mains: f64| (frequency_hz / mains).round() * mains;
-    // what is no further off than a line's width, or than the mains wander, does not average out
+    // hum averages out unless it is within a line's width, or within the mains' variation, of the
+    // loop's frequency
     let near = |mains: &f64| {
         let at = multiple(*mains);
         at > 0.0 && (frequency_hz - at).abs() < line_hz + WANDER * at
@@ -68,12 +72,13 @@ pub(super) fn at_the_loop(record: &HysteresisRecord, frequency_hz: f64) -> Optio
         .find(|found| matches!(found, LoopFinding::Hum { part, .. } if *part > MATTERS))
 }
 
-/// The strongest multiple of the mains that stands free, over the fundamental; 0 if none stands out.
+/// The strongest isolated multiple of the mains frequency over the fundamental; 0 if none stands
+/// out.
 fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     let line_hz = fs_hz / signal.len() as f64;
     let fft = forward(signal.len());
     let mut spectrum = fft.make_output_vec();
-    // lengths are the plan's own, so that nothing can fail
+    // buffer lengths match the FFT plan, so this cannot fail
     if fft.process(&mut signal.to_vec(), &mut spectrum).is_err() {
         return 0.0;
     }
@@ -87,7 +92,7 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     let found: Vec<Option<f64>> = multiples
         .into_par_iter()
         .map(|f| {
-            // the mains are a little off: the largest of the lines nearby
+            // the mains frequency may be slightly off: take the largest of the lines nearby
             let reach = (WANDER * f / line_hz).ceil() as i32;
             let here = (-reach..=reach).map(|o| amplitude(f + f64::from(o) * line_hz)).fold(0.0, f64::max);
             let next = APART as i32 + reach;
@@ -104,9 +109,10 @@ fn part(signal: &[f64], fs_hz: f64, frequency_hz: f64, mains_hz: f64) -> f64 {
     found.into_iter().flatten().fold(0.0, f64::max)
 }
 
-/// |X| at `f`: of the signal's spectrum where that has a line there, as multiples of the mains have in whole seconds, else summed.
+/// |X| at `f`: from the signal's spectrum if that has a line there, as for multiples of the mains
+/// frequency in whole seconds, otherwise by direct summation.
 fn amplitude(signal: &[f64], spectrum: &[Complex<f64>], f: f64, fs_hz: f64) -> f64 {
-    // a real signal has as much at −f
+    // a real signal has the same magnitude at −f
     let widths = (f * signal.len() as f64 / fs_hz).abs();
     match spectrum.get(widths.round() as usize) {
         Some(line) if (widths - widths.round()).abs() < ON_A_LINE => line.norm(),
@@ -114,7 +120,8 @@ fn amplitude(signal: &[f64], spectrum: &[Complex<f64>], f: f64, fs_hz: f64) -> f
     }
 }
 
-/// Mean taken off, and a Blackman-Harris window put on: 92 dB between lines that are five widths apart.
+/// Removes the mean and applies a Blackman-Harris window: 92 dB between lines that are five widths
+/// apart.
 fn windowed(x: &[f64]) -> Vec<f64> {
     let n = x.len() as f64;
     let mean = x.iter().sum::<f64>() / n;
@@ -123,7 +130,7 @@ fn windowed(x: &[f64]) -> Vec<f64> {
     x.iter()
         .zip(&turns)
         .map(|(v, turn)| {
-            // cosines of twice and three times the angle by that of the angle
+            // cosines of two and three times the angle, computed from that of the angle
             let c = (half * turn).re;
             let (c2, c3) = (2.0 * c * c - 1.0, c * (4.0 * c * c - 3.0));
             (v - mean) * (0.35875 - 0.48829 * c + 0.14128 * c2 - 0.01168 * c3)
@@ -140,10 +147,10 @@ mod tests {
 
     const FS_HZ: f64 = 51_200.0;
 
-    /// 0.6 s of 200 Hz and a sample more.
+    /// 0.6 s of 200 Hz plus one sample.
     const SAMPLES: u32 = 30_721;
 
-    /// 200 Hz in noise, with this part of hum at 150 Hz.
+    /// 200 Hz in noise, with this fraction of hum at 150 Hz.
     fn in_noise(samples: u32, seed: u64, hum: f64) -> Vec<f64> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let signal: Vec<f64> = (0..samples)
@@ -182,20 +189,20 @@ mod tests {
             let line = (f * signal.len() as f64 / FS_HZ).round() as usize;
             let found = amplitude(&signal, &spectrum, f, FS_HZ);
             assert_eq!(found.to_bits(), spectrum[line].norm().to_bits(), "{f} Hz");
-            // rounding of both, against the highest line
+            // rounding of both, relative to the highest line
             assert!((found - summed(f)).abs() < 1e-12 * summed(200.0), "{f} Hz: {found} {}", summed(f));
         }
         let beside = 150.3;
         assert_eq!(amplitude(&signal, &spectrum, beside, FS_HZ).to_bits(), summed(beside).to_bits());
     }
 
-    /// Whichever way it is read, the hum is the same: a sample more or less.
+    /// The hum found does not depend on the method used: one sample more or less.
     #[test]
     fn lines_of_the_spectrum_say_what_sums_say() {
         for seed in 0..20 {
             let [on, off] = [SAMPLES - 1, SAMPLES]
                 .map(|samples| part(&in_noise(samples, seed, 0.02), FS_HZ, 200.0, 50.0));
-            // one sample of 30 000, and a line's place by 3e-3 of its width
+            // one sample of 30 000, and a shift of the line by 3e-3 of its width
             assert!((on / off - 1.0).abs() < 1e-3, "seed {seed}: {on} {off}");
         }
     }

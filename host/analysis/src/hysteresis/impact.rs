@@ -1,8 +1,9 @@
 //! Loops of the decay after an impact.
 //!
-//! The record is cut into cycles of the dominant mode from the onset of motion on; each gives the least-squares slope of T on Δx.
-//! The first cycles carry the largest amplitude and all modes at once: their slope is what a first-cycle loop shows, not the contact's
-//! stiffness, and is reported as such.
+//! The record is cut into cycles of the dominant mode, starting at the onset of motion; each gives
+//! the least-squares slope of T on Δx. The first cycles have the largest amplitude and contain all
+//! modes simultaneously: their slope is that of a first-cycle loop, not the contact's stiffness,
+//! and is reported as such.
 
 use super::HysteresisError;
 use super::dominant_frequency::dominant_frequency;
@@ -16,7 +17,8 @@ use num_complex::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// The cycles whose slopes make the record's k: the first two, still well above noise and beyond the pulse itself.
+/// Number of cycles whose slopes are averaged to the record's k: the first two, which are still
+/// well above noise and follow the pulse.
 pub(super) const FIRST_CYCLES: usize = 2;
 
 /// One cycle of the decay.
@@ -43,16 +45,17 @@ pub struct DecayCycle {
 pub(super) struct Decay {
     pub(super) frequency_hz: f64,
     pub(super) cycles: Vec<DecayCycle>,
-    /// From the record's start to the end of the last cycle that was cut.
+    /// From the start of the record to the end of the last cycle.
     pub(super) displacement_m: Vec<f64>,
     /// Phase by which Δx lags T at the mode over the first cycles, degrees.
     pub(super) phase_deg: f64,
 }
 
-/// Cuts a decaying record into its cycles, of which the first `most` (at least [`FIRST_CYCLES`]) are told.
+/// Cuts a decaying record into its cycles, and reports the first `most` of them (at least
+/// [`FIRST_CYCLES`]).
 ///
 /// # Errors
-/// When nothing moves, or not one cycle of the dominant mode follows the onset.
+/// When nothing moves, or there is no whole cycle of the dominant mode after the onset.
 pub(super) fn decay(
     motion: &Relative,
     force_n: &[f64],
@@ -73,20 +76,21 @@ pub(super) fn decay(
             points: period as usize,
         });
     }
-    // a cycle's frequency takes the one after it
+    // the frequency of a cycle also needs the next cycle
     let cut = whole.min(most.saturating_add(1));
     let edges: Vec<usize> = (0..=cut).map(|c| start + (c as f64 * period).round() as usize).collect();
     let end = edges[cut];
     let displacement_m = match motion {
         Relative::Velocity(v) => {
-            // A stuck contact returns to where it was: over whole cycles to the end, mean velocity is the sensor's offset.
+            // A stuck contact returns to its initial position: the mean velocity over whole cycles
+            // to the end of the record is the sensor's offset.
             let until = start + (whole as f64 * period) as usize;
             let offset = v[start..until].iter().sum::<f64>() / (until - start) as f64;
             open_record(&v[..end], offset, 1.0 / fs_hz)
         }
         Relative::Displacement(x) => x[..end].to_vec(),
     };
-    // force and displacement are turned by the same angles
+    // force and displacement are multiplied by the same phase factors
     let turns = turns(start..end, -TAU * frequency_hz / fs_hz);
     let tone = |x: &[f64], from: usize, to: usize| -> Complex<f64> {
         let mean = x[from..to].iter().sum::<f64>() / (to - from) as f64;
@@ -117,7 +121,8 @@ pub(super) fn decay(
     Ok(Decay { frequency_hz, cycles, displacement_m, phase_deg })
 }
 
-/// First sample that stands out: 5 % of the largest deviation, or six times the white noise, whichever is more.
+/// First sample above the threshold: 5 % of the largest deviation, or six times the white noise,
+/// whichever is larger.
 fn onset(x: &[f64]) -> usize {
     let rest = middle(&x[x.len() - x.len() / 4 - 1..]).unwrap_or(0.0);
     let largest = x.iter().map(|v| (v - rest).abs()).fold(0.0, f64::max);
@@ -127,7 +132,8 @@ fn onset(x: &[f64]) -> usize {
     x.iter().position(|v| (v - rest).abs() >= limit).unwrap_or(0)
 }
 
-/// Second differences of white noise have √6 times its rms, their median 0.6745 of that.
+/// Second differences of white noise have √6 times its rms; their median magnitude is 0.6745 of
+/// that.
 const MEDIAN: f64 = 0.6745 * 2.449_489_742_783_178;
 
 fn second_difference(w: &[f64]) -> f64 {
@@ -140,9 +146,9 @@ fn noise(x: &[f64]) -> f64 {
     middle(&second).unwrap_or(0.0) / MEDIAN
 }
 
-/// Whether it is below this for certain: counting is a fraction of the work of finding the median.
+/// Whether the noise is certainly below this; counting is much cheaper than finding the median.
 fn noise_is_below(x: &[f64], rms: f64) -> bool {
-    // by more than rounding
+    // margin for rounding
     let limit = rms * MEDIAN * (1.0 - 1e-9);
     let below: usize = wide(|| x.windows(3).map(|w| usize::from(second_difference(w) < limit)).sum());
     below > x.len().saturating_sub(2) / 2
@@ -177,7 +183,7 @@ mod tests {
             let motion = |i: usize| if i < 500 { 0.0 } else { ((i - 500) as f64 / 20.0).sin() };
             let x: Vec<f64> = (0..2000).map(|i| motion(i) + scatter * dice()).collect();
             let at = onset(&x);
-            // six deviations of 0.05 are reached after six samples
+            // six standard deviations of 0.05 are reached after six samples
             assert!((500..510).contains(&at), "{scatter}: {at}");
         }
     }

@@ -1,44 +1,51 @@
-//! A slipping loop taken apart: friction, a dashpot beside it, and a delay of the force.
+//! Decomposes a slipping loop into friction, a parallel dashpot, and a delay of the force.
 //!
-//! Friction of any kind knows where it is and where it turned back, not how fast it goes. So the averaged loop is written as a sum of
-//! Jenkins elements of all reaches with weights that may not be negative (Iwan's model), plus c Δẋ, for a force that comes later by τ. A
-//! delay turns the corners and the flanks, a dashpot bends the plateaus, and neither can be made of friction: where the loop has
-//! both flanks and plateaus, τ and c are told from each other and from any law of friction.
+//! Friction of any kind depends on position and on the last reversals, not on velocity. The
+//! averaged loop is therefore written as a sum of Jenkins elements of all reaches with non-negative
+//! weights (Iwan's model), plus c Δẋ, for a force delayed by τ. A delay shifts the corners and
+//! tilts the flanks, a dashpot bends the plateaus, and friction can produce neither. If the loop
+//! has both flanks and plateaus, τ and c can be separated from each other and from any law of
+//! friction.
 
 use super::cycle::Cycle;
 use nalgebra::{DMatrix, DVector};
 
-/// Reaches of elements over the whole stroke, and about the one that carries most.
+/// Number of reaches of elements over the whole stroke, and around the one that carries most.
 const COARSE: usize = 16;
 const FINE: usize = 24;
 
-/// Ever closer about what carries most: to this part of its reach, so many each.
+/// Refinement around the element that carries most: relative spread of the reaches, and the number
+/// of elements for each.
 const CLOSER: [f64; 2] = [0.06, 0.015];
 const FINER: usize = 11;
 
-/// Delays near nothing that are looked for, s.
+/// Range of small delays that is searched, s.
 const DELAY_S: [f64; 2] = [-2e-4, 3e-4];
 
-/// Steps of the first look.
+/// Steps of the first search.
 const STEPS: usize = 21;
 
-/// Delays that are looked for over a whole cycle.
+/// Number of delays tried over a whole cycle.
 const AROUND: usize = 64;
 
-/// A delay is known no better than to this part of the time between points, however little noise there is.
+/// The delay's standard deviation is at least this fraction of the time between points, however low
+/// the noise.
 const BETWEEN_POINTS: f64 = 0.05;
 
-/// Second differences of the residual are taken over this part of a cycle, or this time (s), whichever is longer.
+/// Step for the second differences of the residual: this fraction of a cycle, or this time (s),
+/// whichever is longer.
 const PROBE_CYCLES: f64 = 1e-4;
 const PROBE_S: f64 = 1e-5;
 
-/// Columns that may join the active ones: a straight flank needs three, a bent one a dozen.
+/// Maximum number of columns that may join the active set: a straight flank needs three, a bent one
+/// a dozen.
 const ROUNDS: usize = 60;
 
-/// Residuals of neighbouring points go together, which makes the plain formula too sure of itself.
+/// Residuals of neighbouring points are correlated, so the plain formula underestimates the
+/// standard deviation by this factor.
 const TOGETHER: f64 = 3.0;
 
-/// What was found.
+/// Result of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LawFit {
     /// τ, s, and its standard deviation.
@@ -47,17 +54,17 @@ pub(super) struct LawFit {
     pub viscous_n_s_per_m: [f64; 2],
     /// Sums of squared residuals: with both, without the delay, without the dashpot.
     pub residuals: [f64; 3],
-    /// The delay that friction without a dashpot asks for, s.
+    /// The delay found with friction but no dashpot, s.
     pub undamped_s: f64,
     /// Sum of squared residuals of friction alone, without delay and dashpot.
     pub friction_alone: f64,
 }
 
-/// Least squares with weights that may not be negative, but for the last column.
+/// Least squares with non-negative weights, except for the last column.
 struct Problem {
     columns: DMatrix<f64>,
     gram: DMatrix<f64>,
-    /// What the unit columns were divided by.
+    /// Divisors that normalised the columns to unit length.
     scale: Vec<f64>,
 }
 
@@ -83,8 +90,9 @@ impl Problem {
         Self { columns, gram, scale }
     }
 
-    /// Weights of the unit columns and the sum of squared residuals, with the dashpot or without: Lawson and Hanson's active sets, in
-    /// which the dashpot may have either sign.
+    /// Weights of the normalised columns and the sum of squared residuals, with or without the
+    /// dashpot: the active-set method of Lawson and Hanson, in which the dashpot may have either
+    /// sign.
     fn solved(&self, force: &DVector<f64>, dashpot: bool) -> (DVector<f64>, f64) {
         let right = self.columns.tr_mul(force);
         let (count, free) = (right.len(), right.len() - 1);
@@ -100,7 +108,8 @@ impl Problem {
                 Some(j) if slopes[j] > least => active.push(j),
                 _ => break,
             }
-            // weights that would turn negative leave again, the first to do so first
+            // columns whose weight would turn negative leave the active set, the first to reach
+            // zero first
             loop {
                 let Some(wanted) = self.least_squares(&right, &active) else {
                     active.pop();
@@ -125,7 +134,7 @@ impl Problem {
         (weights, left)
     }
 
-    /// Weights of these columns alone; none where they are not independent.
+    /// Weights of these columns alone; `None` if they are linearly dependent.
     fn least_squares(&self, right: &DVector<f64>, active: &[usize]) -> Option<DVector<f64>> {
         let ridge = |i, j| if i == j { 1e-11 } else { 0.0 };
         let gram = DMatrix::from_fn(active.len(), active.len(), |i, j| {
@@ -136,8 +145,8 @@ impl Problem {
     }
 }
 
-/// What a Jenkins element of this reach (m) with this play (m) carries over the cycle, per stiffness: from one round on it repeats
-/// itself.
+/// Force per stiffness of a Jenkins element of this reach (m) with this play (m) over the cycle;
+/// from the second pass on it is periodic.
 fn element(x: &[f64], reach: f64, play_m: f64) -> DVector<f64> {
     let mut slider = 0.0;
     let mut carried = DVector::zeros(x.len());
@@ -146,7 +155,7 @@ fn element(x: &[f64], reach: f64, play_m: f64) -> DVector<f64> {
             let apart = x - slider;
             let taken_up = apart.clamp(-0.5 * play_m, 0.5 * play_m);
             *carried = (apart - taken_up).clamp(-reach, reach);
-            // the slider is drawn along by what is more than play and reach together
+            // the slider moves by the amount that exceeds play and reach
             slider += apart - taken_up - *carried;
         }
     }
@@ -154,11 +163,12 @@ fn element(x: &[f64], reach: f64, play_m: f64) -> DVector<f64> {
 }
 
 impl LawFit {
-    /// Takes the averaged loop of a contact in gross slip apart; `dt_s` between its points, `play_m` of play in it. None for a
-    /// loop that does not move.
+    /// Decomposes the averaged loop of a contact in gross slip, with `dt_s` between its points and
+    /// `play_m` of play in it. `None` for a loop that does not move.
     ///
-    /// Delays near nothing are looked for first. A loop that is later or earlier than those is found over the whole cycle, and
-    /// wins where it leaves less than half of the squares, and next to nothing of the loop.
+    /// Small delays are searched first. A larger delay of either sign is searched over the whole
+    /// cycle; it is preferred if it leaves less than half of the sum of squares and a negligible
+    /// part of the loop.
     pub fn of(cycle: &Cycle, dt_s: f64, play_m: f64) -> Option<Self> {
         let near = Self::within(cycle, dt_s, play_m, 0.0, DELAY_S)?;
         let [low, high] = DELAY_S;
@@ -174,7 +184,7 @@ impl LawFit {
         }
     }
 
-    /// The same for a delay of any part of the cycle.
+    /// The same for a delay of any fraction of the cycle.
     pub fn far(cycle: &Cycle, dt_s: f64, play_m: f64) -> Option<Self> {
         let half = 0.5 * super::loops::swing(&cycle.displacement_m);
         if half.is_nan() || half <= 0.0 {
@@ -187,12 +197,12 @@ impl LawFit {
         let delays = (0..AROUND).map(|i| (i as f64 + 1.0) * step_s - 0.5 * period_s);
         let (first, _) = delays.map(|late_s| (late_s, left(late_s))).min_by(|a, b| a.1.total_cmp(&b.1))?;
         let centre_s = closest(&problem, cycle, dt_s, true, first, step_s);
-        // the coarse elements may pass for a delay of about a step
+        // the coarse elements may imitate a delay of about one step
         let around = DELAY_S.map(|end| centre_s + end.signum() * end.abs().max(1.5 * step_s));
         Self::within(cycle, dt_s, play_m, centre_s, around)
     }
 
-    /// The same for a delay within this range, s, beginning at `first_s`.
+    /// The same for a delay within this range, s, starting at `first_s`.
     fn within(cycle: &Cycle, dt_s: f64, play_m: f64, first_s: f64, range_s: [f64; 2]) -> Option<Self> {
         let points = cycle.force_n.len();
         let half = 0.5 * super::loops::swing(&cycle.displacement_m);
@@ -205,8 +215,8 @@ impl LawFit {
         let (weights, _) = coarse.solved(&shifted(&cycle.force_n, first_s / dt_s), true);
         let most = centre(&coarse, &weights, &reaches)?;
         reaches.extend(spread(0.7 * most, 1.4 * most, FINE));
-        // each look refines the elements about the one that carries most, at the delay that the last one found: a corner between two
-        // reaches would pass for a delay
+        // each pass refines the elements around the one that carries most, at the delay found by
+        // the last pass: otherwise a corner between two reaches would look like a delay
         let mut late = 0.0;
         for width in CLOSER {
             let problem = Problem::new(cycle, &reaches, play_m);
@@ -232,7 +242,8 @@ impl LawFit {
         let std_s = if bend > 0.0 { (2.0 * variance / bend).sqrt() } else { f64::INFINITY };
         // corners lie between points, and interpolation rounds them
         let std_s = std_s.hypot(BETWEEN_POINTS * dt_s);
-        // what the other columns leave of the velocity: at least a half in a loop with flanks and plateaus
+        // part of the velocity that the other columns do not explain: at least half in a loop with
+        // flanks and plateaus
         let std_n_s_per_m = variance.sqrt() / (0.5 * problem.scale[free]);
         Some(Self {
             late_s: [late, std_s],
@@ -244,20 +255,20 @@ impl LawFit {
     }
 }
 
-/// A friction law that leaves more than this part of the force (rms) does not explain a loop.
+/// A friction law that leaves more than this fraction of the force (rms) does not explain a loop.
 const UNEXPLAINED: f64 = 0.02;
 
-/// Whether a sum of squared residuals is more than a friction law may leave of this force.
+/// Whether a sum of squared residuals is larger than a friction law may leave of this force.
 pub(super) fn unexplained(left: f64, force_n: &[f64]) -> bool {
     left > UNEXPLAINED.powi(2) * force_n.iter().map(|t| t * t).sum::<f64>()
 }
 
-/// Reaches from one to another, evenly in their logarithm.
+/// Reaches between two limits, evenly spaced in their logarithm.
 fn spread(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| from * (to / from).powf(i as f64 / (count - 1) as f64)).collect()
 }
 
-/// The reach about which the elements lie that carry most.
+/// Reach of the element that carries most, averaged with its neighbours.
 fn centre(problem: &Problem, weights: &DVector<f64>, reaches: &[f64]) -> Option<f64> {
     let carries = |j: usize| {
         if problem.scale[j] > 0.0 { weights[j] / problem.scale[j] * reaches[j] } else { 0.0 }
@@ -270,7 +281,7 @@ fn centre(problem: &Problem, weights: &DVector<f64>, reaches: &[f64]) -> Option<
     (weight > 0.0).then(|| sum / weight)
 }
 
-/// The delay (s) that leaves least, of all within a range.
+/// The delay (s) within a range that leaves the smallest sum of squares.
 fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, [from, to]: [f64; 2]) -> f64 {
     let step = (to - from) / (STEPS - 1) as f64;
     let left = |late_s: &f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot).1;
@@ -280,7 +291,8 @@ fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, [from, t
     closest(problem, cycle, dt_s, dashpot, first, step)
 }
 
-/// The same near `centre`: a parabola through three that are `width` apart, ever closer.
+/// The same near `centre`, by successive parabolas through three delays that are `width` apart,
+/// with decreasing width.
 fn closest(
     problem: &Problem,
     cycle: &Cycle,
@@ -301,12 +313,12 @@ fn closest(
     centre
 }
 
-/// The closed cycle's force so many points earlier, by cubics.
+/// The force of the closed cycle, advanced by `points` points, with cubic interpolation.
 fn shifted(force: &[f64], points: f64) -> DVector<f64> {
     DVector::from_vec(earlier(force, points))
 }
 
-/// A closed cycle so many points earlier.
+/// A closed cycle advanced by `points` points.
 pub(super) fn earlier(x: &[f64], points: f64) -> Vec<f64> {
     let n = x.len().cast_signed();
     let (whole, t) = (points.floor() as isize, points - points.floor());

@@ -1,16 +1,17 @@
-//! Single lines of a spectrum, by their sums, and the turns that they are summed with.
+//! Single lines of a spectrum by direct summation, and the phase factors used for it.
 
 use crate::vectors::wide;
 use num_complex::Complex;
 use pulp::NullaryFnOnce;
 use std::ops::Range;
 
-/// Samples whose turns share one angle that is computed.
+/// Number of samples per base angle: each phase factor is a product of two computed ones.
 const SHARED: usize = 64;
-/// Sums that run side by side.
+/// Number of parallel partial sums.
 const LANES: usize = 8;
 
-/// e^(i `step` n) of every n of a range: each the product of two that are computed, and right to a few units in the last place.
+/// e^(i `step` n) for every n of a range: each is the product of two computed factors, accurate to
+/// a few units in the last place.
 pub(super) fn turns(range: Range<usize>, step: f64) -> Vec<Complex<f64>> {
     let within: [Complex<f64>; SHARED] = std::array::from_fn(|i| Complex::from_polar(1.0, step * i as f64));
     let mut all = Vec::with_capacity(range.len());

@@ -1,4 +1,4 @@
-//! What the loops of a record say.
+//! Result of the analysis of a record's loops.
 
 use super::finding::LoopFinding;
 use super::impact::DecayCycle;
@@ -17,10 +17,11 @@ pub enum Kind {
     Impact,
 }
 
-/// All that a record's loops say. One loop of the shaker's kind is periodic; an impact's are those of its first cycles.
+/// Full result for a record's loops. The loop of a shaker record is periodic; those of an impact
+/// are its first cycles.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoopAnalysis {
-    /// How it was moved.
+    /// How the contact was moved.
     pub kind: Kind,
     /// Excitation frequency, or the dominant mode of the decay, Hz.
     pub frequency_hz: f64,
@@ -30,15 +31,17 @@ pub struct LoopAnalysis {
     pub force_amplitude_n: f64,
     /// The loop's shape.
     pub shape: Shape,
-    /// What the shape was told from; none for a decay, where it is told from the frequency's fall at large amplitude.
+    /// Evidence for the shape; `None` for a decay, where the shape follows from the drop in
+    /// frequency at large amplitude.
     pub shape_evidence: Option<ShapeEvidence>,
-    /// k_T: slope of the stick part, N/m. None for an ellipse.
+    /// k_T: slope of the stick part, N/m. `None` for an ellipse.
     pub k_t_n_per_m: Option<OverCycles>,
-    /// The part of the force's swing after each reversal in which k_T was read; only where something slips.
+    /// The fraction of the force's swing after each reversal over which k_T was fitted; only if
+    /// something slips.
     pub stick_part: Option<[f64; 2]>,
     /// k_eq: least-squares slope over the whole loop, N/m.
     pub k_eq_n_per_m: OverCycles,
-    /// Loop area per cycle, J. None for a decay, whose loops do not close.
+    /// Loop area per cycle, J. `None` for a decay, whose loops do not close.
     pub energy_j: Option<OverCycles>,
     /// Peak secant of the averaged loop, N/m.
     pub k_secant_n_per_m: Option<f64>,
@@ -46,18 +49,18 @@ pub struct LoopAnalysis {
     pub k_fundamental_n_per_m: Option<Complex<f64>>,
     /// μN from the plateau's median, N; only in gross slip.
     pub friction_limit_n: Option<f64>,
-    /// μ; only with a known normal load.
+    /// μ; only if the normal load is known.
     pub friction_coefficient: Option<f64>,
     /// Phase by which Δx lags T at the fundamental, degrees.
     pub phase_deg: f64,
-    /// Δx of the loop to be drawn, m: the averaged cycle, or the first cycles of a decay.
+    /// Δx of the loop for plotting, m: the averaged cycle, or the first cycles of a decay.
     pub loop_displacement_m: Vec<f64>,
     /// T of the same points, N.
     pub loop_force_n: Vec<f64>,
     /// Every cycle of a decay; empty for a shaker.
     pub decay_cycles: Vec<DecayCycle>,
-    /// What is wrong with the loop or was put right, with its measure.
+    /// Faults of the loop and corrections made, each with its magnitude.
     pub findings: Vec<LoopFinding>,
-    /// What a reader must know.
+    /// Warnings for the reader.
     pub warnings: Vec<String>,
 }

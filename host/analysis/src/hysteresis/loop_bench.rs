@@ -1,4 +1,5 @@
-//! Loops to measure: a contact's law under a sine, seen by sensors with noise, delays and faults.
+//! Simulated loops for tests: a contact's law under a sine, measured by sensors with noise, delays
+//! and faults.
 
 use super::delays::in_step;
 use super::{HysteresisRecord, LoopAnalysis, RelativeMotion, analyse};
@@ -7,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Places of one cycle at which the law is integrated.
+/// Points of one cycle at which the law is integrated.
 const PLACES: usize = 8_192;
 
 /// A contact's law over one steady cycle of x = X sin θ.
@@ -15,13 +16,14 @@ const PLACES: usize = 8_192;
 pub(super) enum Law {
     /// Nothing slips.
     Linear,
-    /// Elements of equal stiffness with these limits over the mean one, μN in all; the limit varies along the stroke by this part.
+    /// Elements of equal stiffness, whose limits are given relative to the mean one, with μN in
+    /// total; the limit varies along the stroke by `along`.
     Sliders { limits: Vec<f64>, limit_n: f64, along: f64 },
     /// dT/dx = k (1 − T/μN sgn ẋ).
     Dahl { limit_n: f64 },
 }
 
-/// A loop to measure.
+/// A simulated measurement.
 #[derive(Debug, Clone)]
 pub(super) struct Bench {
     pub fs_hz: f64,
@@ -29,11 +31,12 @@ pub(super) struct Bench {
     pub stiffness: f64,
     pub amplitude_m: f64,
     pub law: Law,
-    /// Joint's own damping, s.
+    /// The joint's own damping, s.
     pub beta_s: f64,
     pub viscous: f64,
     pub late_s: f64,
-    /// Mains, Hz, its part of the force's amplitude at the loop's frequency, and whether the force or the velocity hums.
+    /// Mains frequency, Hz, its fraction of the force's amplitude at the loop's frequency, and
+    /// whether the force or the velocity has the hum.
     pub hum: Option<(f64, f64, bool)>,
     pub drift: f64,
     pub sign: f64,
@@ -66,7 +69,7 @@ impl Bench {
                 let mut t = 0.0;
                 for i in 0..4 * PLACES {
                     let step = x((i + 1) % PLACES) - x(i % PLACES);
-                    // exact over a step
+                    // exact over one step
                     let end = limit_n * step.signum();
                     t = end + (t - end) * (-self.stiffness * step.abs() / limit_n).exp();
                     if i >= 3 * PLACES {
@@ -98,7 +101,8 @@ impl Bench {
         let hum = |t: f64, force: bool, amplitude: f64| {
             self.hum.filter(|h| h.2 == force).map_or(0.0, |(mains, part, _)| {
                 let at = (self.frequency_hz / 50.0f64.max(mains.round())).round();
-                // all multiples up to the loop's and a little beyond, the further the weaker
+                // all multiples up to that of the loop and a little beyond, weaker with increasing
+                // order
                 (1..=8)
                     .map(f64::from)
                     .map(|m| {
@@ -107,14 +111,15 @@ impl Bench {
                     .sum()
             })
         };
-        // x_B moves with the force as far as its support of 150 N/µm yields
+        // x_B follows the force through its support's compliance of 1/150 µm/N
         let late: [f64; 3] = std::array::from_fn(|_| 1e-4 * rng.random::<f64>());
         let share = 0.3;
         let fastest = self.amplitude_m * TAU * self.frequency_hz;
         let floor = 5e-8 * (0.5 * self.fs_hz).sqrt();
         let noise = |rng: &mut Xoshiro256PlusPlus| -> f64 { StandardNormal.sample(rng) };
         let (mut a, mut b, mut f) = (Vec::new(), Vec::new(), Vec::new());
-        // in_step() holds the last value where a late signal ends: samples beyond the record
+        // in_step() holds the last value where a delayed signal ends, so generate samples beyond
+        // the record
         for i in 0..n + 8 {
             let t = i as f64 / self.fs_hz;
             let side = |t: f64, part: f64| part * (velocity(t) + hum(t, false, fastest)) + 1e-6;
@@ -144,7 +149,7 @@ impl Bench {
     }
 }
 
-/// From `low` to `high`, evenly in the logarithm.
+/// Random value from `low` to `high`, uniform in the logarithm.
 pub(super) fn between(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
     low * (high / low).powf(rng.random::<f64>())
 }
@@ -168,7 +173,7 @@ pub(super) fn stuck(rng: &mut Xoshiro256PlusPlus) -> Bench {
     }
 }
 
-/// In gross slip: one slider, or many.
+/// In gross slip, with one slider or many.
 pub(super) fn slipping(rng: &mut Xoshiro256PlusPlus, one: bool) -> Bench {
     let limit_n = between(rng, 60.0, 300.0);
     let limits = if one { vec![1.0] } else { spread(20, 0.5 + 0.45 * rng.random::<f64>()) };
@@ -176,7 +181,7 @@ pub(super) fn slipping(rng: &mut Xoshiro256PlusPlus, one: bool) -> Bench {
     Bench {
         amplitude_m: between(rng, 2.5, 6.0) * limit_n / base.stiffness,
         law: Law::Sliders { limits, limit_n, along: 0.0 },
-        // a cycle of no less than 60 samples, or flanks hold none
+        // a cycle needs at least 60 samples for the flanks to contain any
         frequency_hz: base.frequency_hz.min(base.fs_hz / 60.0),
         ..base
     }

@@ -1,5 +1,5 @@
-//! What is read off one closed loop of T over Δx. Each quantity has its own name, because at 200 Hz beside a hidden resonance the
-//! peak secant says 213 N/µm where the least-squares slope says 90.
+//! Quantities of one closed loop of T over Δx. Each has its own name, because at 200 Hz near a
+//! hidden resonance the peak secant is 213 N/µm where the least-squares slope is 90 N/µm.
 
 use super::cycle::Cycle;
 use super::sums::dot;
@@ -16,8 +16,9 @@ pub struct OverCycles {
     pub std: f64,
     /// Number of cycles.
     pub cycles: usize,
-    /// 95 % interval of the mean, from the means of contiguous blocks of cycles: neighbouring cycles share slow drifts of amplitude and
-    /// temperature, so that the scatter of single ones would make it too narrow. None for fewer than four cycles.
+    /// 95 % interval of the mean, from the means of contiguous blocks of cycles: neighbouring
+    /// cycles share slow drifts of amplitude and temperature, so that the scatter of single cycles
+    /// would make it too narrow. `None` for fewer than four cycles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ci95: Option<[f64; 2]>,
 }
@@ -26,7 +27,7 @@ pub struct OverCycles {
 const STUDENT_T: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
 
 impl OverCycles {
-    /// Statistics of per-cycle values, in order; none of none.
+    /// Statistics of per-cycle values, in order; `None` for an empty list.
     pub fn of(values: &[f64]) -> Option<OverCycles> {
         if values.is_empty() {
             return None;
@@ -71,15 +72,16 @@ pub fn equivalent_stiffness(cycle: &Cycle) -> f64 {
     slope(&cycle.displacement_m, &cycle.force_n)
 }
 
-/// Weights of the central difference of eighth order: x' = Σ wₖ (x₊ₖ − x₋ₖ) per step.
+/// Weights of the eighth-order central difference: x' = Σ wₖ (x₊ₖ − x₋ₖ) per step.
 const DIFFERENCE: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
 
-/// Area of the closed loop, ∮ T dΔx, J. May come out slightly negative for a stuck contact: that is noise, not an error. The area of
-/// an ellipse beside a hidden resonance is no friction energy.
+/// Area of the closed loop, ∮ T dΔx, J. It may be slightly negative for a stuck contact: that is
+/// noise, not an error. The area of an ellipse near a hidden resonance is not friction energy.
 ///
-/// This is the sum of T Δẋ over the points, with Δẋ by the central difference of eighth order. The polygon through the points
-/// would be the same sum with the difference of first order, and would lose 2.6 % of an ellipse of 16 points; this sum loses
-/// 1e-6 of it. The corners of a friction loop move both sums by about the same.
+/// This is the sum of T Δẋ over the points, with Δẋ from the eighth-order central difference. The
+/// polygon through the points corresponds to the first-order difference and would underestimate an
+/// ellipse of 16 points by 2.6 %; this sum is accurate to 1e-6. The corners of a friction loop
+/// affect both sums about equally.
 pub fn energy(cycle: &Cycle) -> f64 {
     let (x, t) = (&cycle.displacement_m[..], &cycle.force_n[..]);
     let n = x.len().min(t.len());
@@ -87,7 +89,7 @@ pub fn energy(cycle: &Cycle) -> f64 {
         return 0.0;
     }
     let area = |(weight, shift): (&f64, usize)| {
-        // the last points of the cycle are followed by its first ones
+        // the cycle is periodic: its last points are followed by its first ones
         let inside = dot(t, &x[shift..]) - dot(&t[shift..], x);
         let around = dot(&t[n - shift..], &x[..shift]) - dot(&t[..shift], &x[n - shift..]);
         weight * (inside + around)
@@ -100,7 +102,8 @@ pub fn secant_stiffness(cycle: &Cycle) -> f64 {
     closed_swing(&cycle.force_n) / closed_swing(&cycle.displacement_m)
 }
 
-/// Ratio of the fundamentals T₁/Δx₁, N/m: its angle is the phase by which Δx lags T, its real part is k_eq for a sinusoidal Δx.
+/// Ratio of the fundamentals T₁/Δx₁, N/m: its angle is the phase by which Δx lags T, its real part
+/// is k_eq for a sinusoidal Δx.
 pub fn fundamental_stiffness(cycle: &Cycle) -> Complex<f64> {
     harmonic(&cycle.force_n, 1) / harmonic(&cycle.displacement_m, 1)
 }
@@ -111,8 +114,9 @@ pub(super) fn swing(x: &[f64]) -> f64 {
     high - low
 }
 
-/// Largest minus smallest value of one closed cycle. Each extreme is that of the parabola through the outermost point and its two
-/// neighbours: of a sine of 16 points the outermost one may lie 2 % below the peak, the parabola 0.1 %.
+/// Largest minus smallest value of one closed cycle. Each extreme is that of the parabola through
+/// the outermost point and its two neighbours: for a sine of 16 points the outermost point may lie
+/// 2 % below the peak, the parabola 0.1 %.
 pub(super) fn closed_swing(x: &[f64]) -> f64 {
     let n = x.len();
     let extreme = |sign: f64| {
@@ -124,7 +128,8 @@ pub(super) fn closed_swing(x: &[f64]) -> f64 {
     if n < 3 { swing(x) } else { extreme(1.0) - extreme(-1.0) }
 }
 
-/// |T_n/T_1| for n = 2…5. Slip that is the same both ways makes odd ones: a third of 1/9 for a triangle, 1/3 for a rectangle.
+/// |T_n/T_1| for n = 2…5. Slip that is symmetric in both directions gives odd harmonics; the third
+/// is 1/9 for a triangle and 1/3 for a rectangle.
 pub(super) fn harmonics(cycle: &Cycle) -> [f64; 4] {
     let first = harmonic(&cycle.force_n, 1).norm();
     [2, 3, 4, 5].map(|n| harmonic(&cycle.force_n, n).norm() / first)
@@ -161,7 +166,7 @@ mod tests {
                 let [low, high] = OverCycles::of(&values).expect("some").ci95.expect("enough");
                 held += usize::from((low..=high).contains(&7.0));
             }
-            // 950 expected; memory over a block's end costs a little
+            // 950 expected; correlation across the ends of blocks costs a little
             assert!((900..=975).contains(&held), "{memory}: {held}");
         }
         assert_eq!(OverCycles::of(&[1.0, 2.0, 3.0]).expect("some").ci95, None);

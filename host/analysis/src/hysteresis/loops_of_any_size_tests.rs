@@ -1,5 +1,6 @@
-//! Loops of any size, from nanometres to centimetres, millinewtons to meganewtons, 0.1 to 500 Hz: what is found in them, and what
-//! faults of the record do to it. Right values are in closed form.
+//! Loops of any size, from nanometres to centimetres, millinewtons to meganewtons, 0.1 to 500 Hz:
+//! the figures found and the effect of faults of the record. The expected values are in closed
+//! form.
 //!
 //!     cargo test --release -p jointrig-analysis any_size -- --ignored --nocapture
 
@@ -10,18 +11,18 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{PI, TAU};
 
-/// What carries the force.
+/// The element that carries the force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Law {
-    /// A spring, and a dashpot that gives this phase, rad.
+    /// A spring, and a dashpot that causes this phase, rad.
     Ellipse(f64),
     /// One spring with a slider.
     Slider,
-    /// Twenty of them, whose limits go from 0.05 to 1.95 of their mean.
+    /// Twenty of them, with limits from 0.05 to 1.95 times their mean.
     Sliders,
 }
 
-/// A record to be made: sizes, sampling, and faults.
+/// Parameters of a simulated record: sizes, sampling, and faults.
 #[derive(Debug, Clone)]
 struct Loop {
     law: Law,
@@ -29,24 +30,25 @@ struct Loop {
     stiffness: f64,
     /// m.
     amplitude: f64,
-    /// Amplitude over what the springs take until all slip.
+    /// Amplitude over the displacement at which everything slips.
     over: f64,
     frequency_hz: f64,
     points: f64,
     cycles: f64,
-    /// Noise of displacement (or velocity) and force over their amplitudes.
+    /// Noise of displacement (or velocity) and force, relative to their amplitudes.
     noise: f64,
     velocity: bool,
-    /// Part of the cycle by which the force is late.
+    /// Fraction of the cycle by which the force is delayed.
     late: f64,
-    /// Drift of displacement and force per cycle, over their amplitudes, and how it bends over the record.
+    /// Drift of displacement and force per cycle relative to their amplitudes, and its curvature
+    /// over the record.
     drift: [f64; 2],
     bow: f64,
-    /// Stated frequency over the true one.
+    /// Stated frequency relative to the true one.
     stated: f64,
-    /// Play over the amplitude.
+    /// Play relative to the amplitude.
     play: f64,
-    /// Cycles in which the amplitude grows to its full size.
+    /// Number of cycles over which the amplitude grows to its full size.
     grows: f64,
 }
 
@@ -79,12 +81,12 @@ impl Loop {
         }
     }
 
-    /// One slider in gross slip, from the same sizes.
+    /// One slider in gross slip, with random sizes.
     fn slider(rng: &mut Xoshiro256PlusPlus) -> Self {
         Self { law: Law::Slider, over: between(rng, 3.0, 8.0), ..Self::any(rng) }
     }
 
-    /// Force with everything slipping, N.
+    /// Force while everything slips, N.
     fn limit(&self) -> f64 {
         self.stiffness * self.amplitude / self.over
     }
@@ -101,7 +103,7 @@ impl Loop {
     fn record(&self, rng: &mut Xoshiro256PlusPlus) -> HysteresisRecord {
         let fs_hz = self.frequency_hz * self.points;
         let n = (self.cycles * self.points).floor() as usize;
-        // the law is followed on a finer grid, a cycle ahead
+        // the law is integrated on a finer grid, starting one cycle earlier
         let fine = (2_000.0 / self.points).ceil() as usize;
         let w = TAU / self.points;
         let size =
@@ -192,7 +194,7 @@ fn energy_of(found: &LoopAnalysis) -> f64 {
     found.energy_j.map_or(f64::NAN, |energy| energy.mean)
 }
 
-/// k_T, energy and friction limit of one slider, to these parts.
+/// Whether k_T, energy and friction limit of one slider are right within these relative tolerances.
 fn slider_is_right(l: &Loop, found: &LoopAnalysis, k: f64, energy: f64) -> bool {
     found.shape == Shape::GrossSlip
         && found.k_t_n_per_m.is_some_and(|found| near(found.mean, l.stiffness, k))
@@ -200,7 +202,7 @@ fn slider_is_right(l: &Loop, found: &LoopAnalysis, k: f64, energy: f64) -> bool 
         && found.friction_limit_n.is_some_and(|found| near(found, l.limit(), 0.02))
 }
 
-/// Clean loops with a finding that they should not have, or a wrong figure.
+/// Clean loops with a false finding or a wrong figure.
 fn false_findings(first_seed: u64, count: u64) -> Vec<String> {
     let one = |seed: u64| -> Option<String> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(first_seed + seed);
@@ -227,7 +229,8 @@ fn false_findings(first_seed: u64, count: u64) -> Vec<String> {
     (0..count).filter_map(one).collect()
 }
 
-/// A fault of the record: how it is made, and whether it was found and its figures are right.
+/// A fault of the record: its name, how it is made, and whether it was found with the right
+/// figures.
 type Fault = (&'static str, fn(&mut Xoshiro256PlusPlus) -> Loop, fn(&Loop, &LoopAnalysis) -> bool);
 
 fn signed(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
@@ -305,7 +308,7 @@ const FAULTS: [Fault; 5] = [
     ),
 ];
 
-/// How many of `count` loops with each fault are right, and the others.
+/// The number of `count` loops with each fault that are right, and descriptions of the others.
 fn found_of(count: u64) -> Vec<(&'static str, usize, Vec<String>)> {
     let each = |(place, (name, make, right)): (usize, &Fault)| {
         let one = |seed: u64| -> Option<String> {
@@ -368,7 +371,8 @@ fn table_of_loops_of_any_size() {
     }
 }
 
-/// An ellipse has its own area, whatever its number of samples: 16 to 25 to a cycle, which need not be a whole number.
+/// The area of an ellipse does not depend on the number of samples: 16 to 25 per cycle, which need
+/// not be a whole number.
 #[test]
 fn an_ellipse_of_few_samples_has_its_area_and_amplitude() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
@@ -383,7 +387,7 @@ fn an_ellipse_of_few_samples_has_its_area_and_amplitude() {
                 ..Loop::any(&mut rng)
             };
             let found = l.analysed(&mut rng).expect("a loop");
-            // cubic interpolation between 16 samples loses 1e-3
+            // cubic interpolation between 16 samples is accurate to 1e-3
             assert!(
                 near(energy_of(&found), l.energy(), 3e-3),
                 "{points} {velocity}: {}",
@@ -398,7 +402,7 @@ fn an_ellipse_of_few_samples_has_its_area_and_amplitude() {
     }
 }
 
-/// A delay turns a loop that sticks into an ellipse, and nothing in it tells how much of that is damping.
+/// A delay turns a sticking loop into an ellipse, in which it cannot be distinguished from damping.
 #[test]
 fn a_late_force_without_slip_is_a_lower_bound_and_never_put_right() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
@@ -415,7 +419,7 @@ fn a_late_force_without_slip_is_a_lower_bound_and_never_put_right() {
     assert!(early.warnings.iter().any(|w| w.contains("out of step")), "{:?}", early.warnings);
 }
 
-/// Where no cycle is like the next one, there is no steady loop.
+/// If no two consecutive cycles are alike, there is no steady loop.
 #[test]
 fn a_record_that_grows_all_along_is_refused() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
@@ -423,7 +427,7 @@ fn a_record_that_grows_all_along_is_refused() {
     assert!(matches!(l.analysed(&mut rng), Err(HysteresisError::NotSteady { cycles: 4, .. })));
 }
 
-/// Three cycles, of which the first grows: the other two are the loop.
+/// Of three cycles, the first grows: the other two form the loop.
 #[test]
 fn one_growing_cycle_of_three_is_left_out() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
@@ -455,7 +459,7 @@ fn one_growing_cycle_of_three_is_left_out() {
     }
 }
 
-/// Force and motion that run at different frequencies, neither of them the stated one, are no loop.
+/// Force and motion at different frequencies, neither of them the stated one, form no loop.
 #[test]
 fn two_frequencies_beside_the_stated_one_are_refused_with_all_three() {
     let wave = |frequency: f64| -> Vec<f64> {
@@ -474,8 +478,9 @@ fn two_frequencies_beside_the_stated_one_are_refused_with_all_three() {
     }
 }
 
-/// Loops of twenty sliders, some or all of which let go, with a force out of step by 1.5 to 10 % of the cycle: those whose k_T is
-/// wrong by more than 15 % and that have no finding of it, and those that were put in step wrongly.
+/// Loops of twenty sliders, some or all of which slip, with a force shifted by 1.5 to 10 % of the
+/// cycle. Returns those whose k_T is wrong by more than 15 % without a finding, and those that were
+/// corrected wrongly.
 fn microslip_out_of_step(first_seed: u64, count: u64) -> [Vec<String>; 2] {
     let (mut silent, mut wrong) = (Vec::new(), Vec::new());
     for seed in 0..count {
@@ -499,8 +504,9 @@ fn microslip_out_of_step(first_seed: u64, count: u64) -> [Vec<String>; 2] {
     [silent, wrong]
 }
 
-/// A force that is early by a few per cent of the cycle looks like friction of short reach where the loop has no plateau. That is the
-/// limit of what a loop tells, and some of these stay unseen; none may be put in step wrongly.
+/// A force that leads by a few per cent of the cycle looks like friction of short reach if the loop
+/// has no plateau. A loop alone cannot resolve this, so some of these remain undetected; none may
+/// be corrected wrongly.
 #[test]
 fn a_force_out_of_step_in_microslip_is_said_but_for_a_few() {
     let [silent, wrong] = microslip_out_of_step(90_000, 60);

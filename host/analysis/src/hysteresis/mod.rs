@@ -1,14 +1,18 @@
-//! Hysteresis: loops of the tangential force T over the relative displacement Δx, and what they say of the contact.
+//! Hysteresis: loops of the tangential force T over the relative displacement Δx, and the contact's
+//! properties derived from them.
 //!
-//! The way through the room: [`record`] (what was measured) → [`integration`] (velocity to displacement over whole cycles) → [`cycles`]
-//! (a shaker's record, cut by its frequency) or [`impact`] (a decay, cut by its dominant mode) → [`loops`] (slopes, area, secant,
-//! fundamental) with `stick` (the stick part and the plateau) and [`shape`]; `steady` puts a shaker's record together. [`analyse`](mod@analyse) is the front
-//! door, [`loop_analysis`] what comes out of it.
+//! Processing order: [`record`] (the measured signals) → [`integration`] (velocity to displacement
+//! over whole cycles) → [`cycles`] (a shaker record, cut by its frequency) or [`impact`] (a decay,
+//! cut by its dominant mode) → [`loops`] (slopes, area, secant, fundamental) with `stick` (the
+//! stick part and the plateau) and [`shape`]; `steady` combines them for a shaker record.
+//! [`analyse`](mod@analyse) is the entry point, [`loop_analysis`] its result.
 //!
-//! Definitions are fixed here and nowhere else: k_T is the least-squares slope of the stick part; k_eq that of the whole loop; the peak
-//! secant and the ratio of fundamentals carry their own names. T is taken as given: the load cells' sum is not T at the
-//! contact (the static arm's inertia adds 2.4 % at 250 Hz). [`correction`] makes the contact's force of it, by what [`static_arm`]
-//! identified, and the corrected record is analysed beside the raw one. [`compliance`] looks at the same signals in frequency, [`backbone`] at several levels.
+//! Definitions are stated only here: k_T is the least-squares slope of the stick part; k_eq that of
+//! the whole loop; the peak secant and the ratio of fundamentals have their own names. T is used as
+//! given: the load cells' sum is not T at the contact (the static arm's inertia adds 2.4 % at 250
+//! Hz). [`correction`] converts it to the contact's force, with the parameters that [`static_arm`]
+//! identified, and the corrected record is analysed in addition to the raw one. [`compliance`]
+//! treats the same signals in the frequency domain, [`backbone`] several levels.
 
 pub mod analyse;
 pub mod backbone;
@@ -74,16 +78,16 @@ pub enum HysteresisError {
         /// Its samples.
         samples: usize,
     },
-    /// The sampling rate is no positive number.
+    /// The sampling rate is not a positive number.
     #[error("the sampling rate is {0} Hz: a positive number is needed")]
     SamplingRate(f64),
-    /// The excitation frequency is no positive number.
+    /// The excitation frequency is not a positive number.
     #[error("the excitation frequency is {0} Hz: a positive number is needed, or none for an impact")]
     Excitation(f64),
     /// A value is NaN or infinite.
     #[error("sample {sample} is not a number: cut the record before it")]
     NotFinite {
-        /// The first such sample.
+        /// Index of the first such sample.
         sample: usize,
     },
     /// There is no whole cycle, or too few samples in one.
@@ -110,7 +114,7 @@ pub enum HysteresisError {
         /// The strongest frequency of the relative motion, Hz.
         motion_hz: f64,
     },
-    /// No two cycles in a row are alike.
+    /// No two consecutive cycles are alike.
     #[error(
         "none of the {cycles} cycles has the amplitude of its neighbour ({low_m:.3e} to {high_m:.3e} m): no steady loop is in this record; record longer, or after the excitation has settled"
     )]

@@ -1,12 +1,14 @@
-//! Whose resonance it is that hides: the phase of each specimen against its own arm, from the same impact (the paper's Fig. 8).
+//! Identifies which specimen has a hidden resonance: the phase of each specimen relative to its own
+//! arm, from the same impact (the paper's Fig. 8).
 
 use num_complex::Complex;
 
-/// The split is looked for within this many Hz of the resonance: the phase turns fastest beside the peak of Δx/T.
+/// The split is searched within this distance of the resonance, Hz: the phase changes fastest near
+/// the peak of Δx/T.
 const NEAR_HZ: f64 = 8.0;
-/// Lines within ± this many Hz are averaged.
+/// Lines within ± this distance are averaged, Hz.
 const AVERAGE_HZ: f64 = 0.75;
-/// A smaller turn of the phase is noise, degrees.
+/// A smaller phase difference is noise, degrees.
 const CLEAR_DEG: f64 = 5.0;
 
 /// An FRF on evenly spaced lines.
@@ -14,7 +16,7 @@ const CLEAR_DEG: f64 = 5.0;
 pub struct Curve<'a> {
     /// First line, Hz.
     pub first_hz: f64,
-    /// Distance of lines, Hz.
+    /// Spacing of the lines, Hz.
     pub step_hz: f64,
     /// Magnitude, \[line\], in one unit for all curves that are compared.
     pub magnitude: &'a [f64],
@@ -36,18 +38,19 @@ pub enum Specimen {
 pub struct PhaseSplit {
     /// The frequency, Hz.
     pub frequency_hz: f64,
-    /// Specimen A against specimen B.
+    /// Specimen A relative to specimen B.
     pub specimens: f64,
-    /// Specimen A against arm A.
+    /// Specimen A relative to arm A.
     pub a: f64,
-    /// Specimen B against arm B.
+    /// Specimen B relative to arm B.
     pub b: f64,
-    /// Arm A against arm B.
+    /// Arm A relative to arm B.
     pub arms: f64,
 }
 
 impl PhaseSplit {
-    /// Where x_A and x_B are furthest out of phase near `resonance_hz`; none where the curves have no line there.
+    /// At the frequency near `resonance_hz` where x_A and x_B are furthest out of phase; `None` if
+    /// the curves have no line there.
     pub fn near(
         [x_a, x_b]: [Curve<'_>; 2],
         [arm_a, arm_b]: [Curve<'_>; 2],
@@ -68,7 +71,8 @@ impl PhaseSplit {
             .max_by(|x, y| x.specimens.abs().total_cmp(&y.specimens.abs()))
     }
 
-    /// The specimen that moves in its clamp, where one clearly turns more against its own arm than the other.
+    /// The specimen that moves in its clamp, if its phase relative to its own arm clearly exceeds
+    /// that of the other.
     pub fn moves(&self) -> Option<Specimen> {
         let (a, b) = (self.a.abs(), self.b.abs());
         if a > CLEAR_DEG && a > 2.0 * b {
@@ -86,7 +90,7 @@ impl Curve<'_> {
         self.first_hz + self.step_hz * line as f64
     }
 
-    /// Sum of the lines around a frequency; none off the lines.
+    /// Sum of the lines around a frequency; `None` outside the lines.
     fn around(&self, frequency_hz: f64) -> Option<Complex<f64>> {
         let lines =
             (0..self.phase_deg.len()).filter(|&l| (self.frequency_hz(l) - frequency_hz).abs() <= AVERAGE_HZ);
@@ -95,7 +99,7 @@ impl Curve<'_> {
         (sum.norm() > 0.0).then_some(sum)
     }
 
-    /// Phase against another curve around a frequency, degrees; none off their lines.
+    /// Phase relative to another curve around a frequency, degrees; `None` outside their lines.
     fn turned(&self, against: &Curve<'_>, frequency_hz: f64) -> Option<f64> {
         let phase = (self.around(frequency_hz)? * against.around(frequency_hz)?.conj()).arg().to_degrees();
         phase.is_finite().then_some(phase)
@@ -106,7 +110,7 @@ impl Curve<'_> {
 mod tests {
     use super::*;
 
-    /// Everything moves alike but the curve `own`, which has a mode of its own at 192 Hz.
+    /// All curves move alike except the curve `own`, which has an additional mode at 192 Hz.
     fn curves(own: usize) -> [(Vec<f64>, Vec<f64>); 4] {
         [0, 1, 2, 3].map(|curve| {
             (0..400)

@@ -1,16 +1,17 @@
-//! The flat parts of a loop: the plateaus of gross slip (the friction limit at the middle of the stroke, and how it goes with the
-//! place), and play, where the contact moves and the force stays.
+//! The flat parts of a loop: the plateaus of gross slip (the friction limit at the middle of the
+//! stroke, and its dependence on position), and play, where the contact moves at constant force.
 
 use super::cycle::Cycle;
 use super::loops::{slope, swing};
 
-/// The plateau begins so many times the flank's length behind the reversal: the structure rings when the contact lets go.
+/// The plateau begins this many flank lengths after the reversal: the structure rings when the
+/// contact starts to slip.
 const BEYOND_FLANK: f64 = 1.25;
 
-/// And ends before this part of the stroke, where the motion stops.
+/// It ends at this fraction of the stroke, before the motion stops.
 const UNTIL: f64 = 0.97;
 
-/// Fewer samples on either plateau say nothing.
+/// Fewest samples needed on each plateau.
 const FEWEST_SAMPLES: usize = 6;
 
 /// Both plateaus as straight lines T = ±μN (1 + a x/X).
@@ -24,20 +25,20 @@ pub(super) struct Plateaus {
     pub std: f64,
 }
 
-/// Less change along the stroke is not told,
+/// A smaller change along the stroke is not reported,
 const UNEVEN: f64 = 0.05;
 
-/// nor less than so many standard deviations: ringing goes together from point to point.
+/// nor one below this many standard deviations: ringing is correlated from point to point.
 const SIGNIFICANT: f64 = 8.0;
 
 impl Plateaus {
-    /// Whether the limit goes with the place.
+    /// Whether the limit depends on position.
     pub fn is_uneven(&self) -> bool {
         self.change.abs() > UNEVEN.max(SIGNIFICANT * self.std)
     }
 
-    /// Of the averaged loop, whose flanks have the stiffness k (N/m), hold `play_m` of play and end near ± `limit_n`; none where
-    /// they are too short.
+    /// From the averaged loop, whose flanks have the stiffness k (N/m), contain `play_m` of play
+    /// and end near ± `limit_n`; `None` if the plateaus are too short.
     pub fn of(
         cycle: &Cycle,
         strokes: &[Vec<usize>; 2],
@@ -77,40 +78,43 @@ fn line(x: &[f64], y: &[f64]) -> [f64; 3] {
     [my - steep * mx, steep, apart / (n - 2.0) / spread]
 }
 
-/// Half the part of the force's swing in which a flat part is looked for, and the steps between these parts.
+/// Half-width of the window of the force's swing in which a flat part is searched, and the step
+/// between windows.
 const HALF_WINDOW: f64 = 0.05;
 const WINDOW_STEP: f64 = 0.025;
 
-/// The parts of the swing before and after it that say how far the contact moves without play,
+/// Width of the windows of the swing before and after it that give the motion without play,
 const BESIDE: f64 = 0.12;
 
-/// and where the first of them begins and the last ends: nearer to the reversal Δx hardly moves, and a plateau follows.
+/// and the limits for the first and last of them: nearer to the reversal Δx hardly moves, and
+/// beyond the second limit a plateau follows.
 const ENDS: [f64; 2] = [0.03, 0.92];
 
-/// The flat part takes so many times the motion per force of either,
+/// The flat part needs this many times the motion per force of either neighbouring window,
 const FLAT: f64 = 3.0;
 
-/// and this part of the motion from reversal to reversal, or it may be noise or ringing.
+/// and this fraction of the motion from reversal to reversal; otherwise it may be noise or ringing.
 const LEAST_PLAY: f64 = 0.02;
 
-/// Both strokes must show the same play to this part.
+/// Both strokes must show the same play within this fraction.
 const ALIKE: f64 = 0.35;
 
-/// Fewer samples between the ends of a flank show no flat part.
+/// Fewest samples between the ends of a flank needed to find a flat part.
 const FEWEST_ON_FLANK: usize = 12;
 
 /// Play between the parts of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Play {
-    /// By how much the contact moves while the force stays, m.
+    /// Motion of the contact at constant force, m.
     pub size_m: f64,
     /// Half the difference between both strokes, m.
     pub std_m: f64,
 }
 
 impl Play {
-    /// Of the averaged loop. A contact with play is stiff after the reversal, then moves without force, and is stiff again; a flank
-    /// that only bends grows softer towards its end, and has no such part.
+    /// From the averaged loop. A contact with play is stiff after the reversal, then moves without
+    /// force, and is stiff again; a flank that only bends softens towards its end and has no such
+    /// part.
     pub fn of(cycle: &Cycle, strokes: &[Vec<usize>; 2]) -> Option<Self> {
         let least = LEAST_PLAY * swing(&cycle.displacement_m);
         let [one, other] = strokes.each_ref().map(|stroke| flat_part(cycle, stroke));
@@ -120,18 +124,19 @@ impl Play {
     }
 }
 
-/// The motion of the flattest part within one flank beyond what the flank beside it takes, m.
+/// Motion of the flattest part within one flank in excess of that of the adjacent flank, m.
 fn flat_part(cycle: &Cycle, stroke: &[usize]) -> Option<f64> {
     let (first, last) = (*stroke.first()?, *stroke.last()?);
     let (x, t) = (&cycle.displacement_m, &cycle.force_n);
-    // part of the force's swing, and the motion since the reversal
+    // fraction of the force's swing, and the motion since the reversal
     let course: Vec<[f64; 2]> =
         stroke.iter().map(|&i| [(t[i] - t[first]) / (t[last] - t[first]), (x[i] - x[first]).abs()]).collect();
     let on_flank = course.iter().filter(|[part, _]| (ENDS[0]..ENDS[1]).contains(part)).count();
     if on_flank < FEWEST_ON_FLANK {
         return None;
     }
-    // where the force first passes a part of its swing, by a straight line between samples
+    // where the force first reaches a fraction of its swing, by linear interpolation between
+    // samples
     let passes = |level: f64| {
         let at = course.iter().position(|[part, _]| *part >= level)?;
         let ([before, from], [after, to]) = (course[at.checked_sub(1)?], course[at]);

@@ -1,26 +1,27 @@
-//! A decay put together from a few decaying sinusoids: whether two modes alone explain what a specimen does.
+//! Fits a decay with a few decaying sinusoids, to check whether two modes alone explain a
+//! specimen's motion.
 
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
-/// Decay rates that are tried for each mode, 1/s: 0.4 % to 8 % of damping at 200 Hz.
+/// Decay rates tried for each mode, 1/s: 0.4 % to 8 % of damping at 200 Hz.
 const DECAYS_PER_S: [f64; 7] = [5.0, 10.0, 18.0, 30.0, 45.0, 65.0, 100.0];
 
 /// A sum of decaying sinusoids fitted to a signal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decaying {
-    /// Frequency (Hz), decay rate (1/s) and amplitude at the beginning (the signal's unit) of each.
+    /// Frequency (Hz), decay rate (1/s) and initial amplitude (the signal's unit) of each.
     pub modes: Vec<[f64; 3]>,
     /// The sum, sample by sample.
     pub signal: Vec<f64>,
-    /// The straight line beneath it: what the integration of a velocity leaves.
+    /// The straight line added to it: the residue of integrating a velocity.
     pub trend: Vec<f64>,
-    /// Part of the signal's variance about that line that the sum explains.
+    /// Fraction of the signal's variance about that line that the sum explains.
     pub explained: f64,
 }
 
-/// The best sum of one sinusoid of each frequency (one or two), with the best of some decay rates and a straight line; none for a signal that
-/// does not move or holds fewer samples than unknowns.
+/// The best sum of one sinusoid for each frequency (one or two) and a straight line, over the decay
+/// rates tried; `None` for a signal that does not move or has fewer samples than unknowns.
 pub fn decaying(signal: &[f64], fs_hz: f64, frequencies_hz: &[f64]) -> Option<Decaying> {
     let rates: Vec<Vec<f64>> = match frequencies_hz.len() {
         1 => DECAYS_PER_S.iter().map(|d| vec![*d]).collect(),
@@ -39,7 +40,7 @@ fn fitted(signal: &[f64], fs_hz: f64, frequencies_hz: &[f64], rates: &[f64]) -> 
     let basis = DMatrix::from_fn(signal.len(), unknowns, |i, column| {
         let t = i as f64 / fs_hz;
         let Some((frequency, rate)) = frequencies_hz.get(column / 2).zip(rates.get(column / 2)) else {
-            // in parts of the signal's length, so that the columns are of one size
+            // scaled by the signal's length, so that the columns are of similar size
             return if column % 2 == 0 { 1.0 } else { i as f64 / signal.len() as f64 };
         };
         let angle = TAU * frequency * t;

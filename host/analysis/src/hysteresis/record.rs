@@ -1,10 +1,10 @@
-//! What a hysteresis measurement gives: motion on both sides of the contact, and the tangential force.
+//! Data of a hysteresis measurement: motion on both sides of the contact, and the tangential force.
 
 use super::HysteresisError;
 use crate::parallel::prelude::*;
 use std::ops::Range;
 
-/// A record shorter than this holds nothing that could be called a loop.
+/// A record shorter than this cannot contain a loop.
 const FEWEST_SAMPLES: usize = 32;
 
 /// A time record. All signals have the same length.
@@ -12,27 +12,28 @@ const FEWEST_SAMPLES: usize = 32;
 pub struct HysteresisRecord {
     /// Sampling rate, Hz.
     pub fs_hz: f64,
-    /// Motion beside the contact.
+    /// Motion on both sides of the contact.
     pub motion: RelativeMotion,
-    /// Tangential force T, N: the load cells' sum, or a corrected force; positive when it pushes A back.
+    /// Tangential force T, N: the load cells' sum, or a corrected force; positive when it pushes A
+    /// back.
     pub force_n: Vec<f64>,
-    /// Frequency of the shaker, Hz; none for an impact.
+    /// Frequency of the shaker, Hz; `None` for an impact.
     pub excitation_hz: Option<f64>,
-    /// Normal load, N, where it is known.
+    /// Normal load, N, if known.
     pub normal_load_n: Option<f64>,
 }
 
 /// Motion of the two specimens along the sliding direction.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RelativeMotion {
-    /// As vibrometers give it.
+    /// Measured by vibrometers.
     Velocity {
         /// Of specimen A, m/s.
         a_m_per_s: Vec<f64>,
         /// Of specimen B, m/s.
         b_m_per_s: Vec<f64>,
     },
-    /// As displacement sensors give it.
+    /// Measured by displacement sensors.
     Displacement {
         /// Of specimen A, m.
         a_m: Vec<f64>,
@@ -41,12 +42,12 @@ pub enum RelativeMotion {
     },
 }
 
-/// Relative motion A − B, still as it was measured.
+/// Relative motion A − B, in the measured quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Relative {
-    /// m/s.
+    /// Velocity, m/s.
     Velocity(Vec<f64>),
-    /// m.
+    /// Displacement, m.
     Displacement(Vec<f64>),
 }
 
@@ -61,7 +62,8 @@ impl HysteresisRecord {
         }
     }
 
-    /// A − B over a range of samples, into `to`; beyond the record's ends their values go on.
+    /// A − B over a range of samples, into `to`; beyond the ends of the record its end values are
+    /// repeated.
     pub(super) fn relative_motion(&self, range: Range<isize>, to: &mut Vec<f64>) {
         let (RelativeMotion::Velocity { a_m_per_s: a, b_m_per_s: b }
         | RelativeMotion::Displacement { a_m: a, b_m: b }) = &self.motion;
@@ -97,20 +99,21 @@ impl HysteresisRecord {
     }
 }
 
-/// Samples that are looked through at once.
+/// Number of samples checked per chunk.
 const CHUNK: usize = 1 << 14;
 
-/// The first value that is no number.
+/// Index of the first value that is not finite.
 fn not_finite(x: &[f64]) -> Option<usize> {
     let place = |(chunk, values): (usize, &[f64])| {
-        // without a way out of the loop it runs over several values at once
+        // without an early exit, the compiler vectorises the loop
         let all = values.iter().fold(true, |all, v| all & v.is_finite());
         if all { None } else { values.iter().position(|v| !v.is_finite()).map(|i| chunk * CHUNK + i) }
     };
     x.par_chunks(CHUNK).enumerate().filter_map(place).min()
 }
 
-/// Fills `to` with a range of samples out of `len`: what lies inside by `fill`, what lies outside with its first and last value.
+/// Fills `to` with a range of samples out of `len`: the part inside by `fill`, the parts outside
+/// with the first and last value.
 pub(super) fn within(
     range: Range<isize>,
     len: usize,

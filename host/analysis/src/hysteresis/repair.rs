@@ -1,63 +1,69 @@
-//! What a loop in gross slip is put right by before its figures are read: a delay of the force, a dashpot beside the friction.
+//! Corrections applied to a loop in gross slip before its figures are computed: a delay of the
+//! force, a dashpot parallel to the friction.
 
 use super::cycle::Cycle;
 use super::finding::LoopFinding;
 use super::law_fit::{LawFit, earlier, unexplained};
 
-/// A delay below this is left alone, s: channels are never in step to better.
+/// A shorter delay is not corrected, s: channels are never aligned better than this.
 const LATE_S: f64 = 8e-6;
 
-/// Nor does a loop of few samples show a small part of one between them.
+/// A delay below this many samples does not show in a loop of few samples and is not corrected
+/// either.
 const LATE_SAMPLES: f64 = 0.4;
 
-/// A dashpot whose force stays below this part of the loop's is left alone.
+/// A dashpot whose force stays below this fraction of the loop's force is not corrected.
 const VISCOUS: f64 = 0.02;
 
-/// Either must be so many of its standard deviations,
+/// Both must exceed this many of their standard deviations,
 const SIGNIFICANT: f64 = 5.0;
 
-/// and leave so many times the squares when it is not allowed for.
+/// and the sum of squares without them must be larger by this factor.
 const BETTER: f64 = 1.5;
 
-/// What is taken out of the force.
+/// Corrections to the force.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Repair {
-    /// By which it comes too late, in points of the cycle.
+    /// Delay of the force, in points of the cycle.
     late_points: f64,
-    /// N s/m.
+    /// Viscous damping coefficient, N s/m.
     viscous: f64,
-    /// What is not known of it, over it.
+    /// Relative uncertainty of the correction.
     unsure: f64,
 }
 
-/// The delay found must leave less than this part of the squares,
+/// The delay found must leave less than this fraction of the sum of squares,
 const EXPLAINS: f64 = 0.25;
 
-/// be at least this part of the cycle (a small one leaves the loop's shape, and is looked for with the dashpot),
+/// be at least this fraction of the cycle (a small delay preserves the loop's shape, and is fitted
+/// together with the dashpot),
 const SHORTEST: f64 = 0.01;
 
-/// and be no longer than this part: beyond it, the force's sign may as well be wrong.
+/// and be no longer than this fraction: beyond it, the force may equally have the wrong sign.
 const LONGEST: f64 = 0.25;
 
-/// Friction alone that leaves this part of the force (rms) or less explains a loop. It may take a delay for friction of short reach,
-/// and then leaves little.
+/// Friction alone explains a loop if it leaves at most this fraction of the force (rms). It may
+/// take a delay for friction of short reach, and then leaves little.
 const ALONE: f64 = 0.003;
 
-/// What a search for a delay over the whole cycle said.
+/// Result of a search for a delay over the whole cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Delay {
-    /// The loop needs none.
+    /// The loop is not delayed.
     None,
-    /// So much explains it, s (and its standard deviation).
+    /// This delay explains it, s (and its standard deviation).
     Found(f64, f64),
-    /// It looks late by so much, s (and its standard deviation), but that does not explain it.
+    /// It looks delayed by this much, s (and its standard deviation), but the delay does not
+    /// explain it.
     NotExplained(f64, f64),
-    /// A dashpot beside the friction explains it about as well as a force that is late by so much, s (early if negative, as for any
-    /// dashpot that takes energy; and its standard deviation).
+    /// A dashpot parallel to the friction explains the loop about as well as a delay of the force
+    /// by this much, s (negative if the force leads, as for any dashpot that dissipates; and its
+    /// standard deviation).
     OrDamped(f64, f64),
 }
 
-/// Whether a loop that bends is a friction loop whose force is out of step by so much that its figures are lost.
+/// Whether a loop that bends is a friction loop whose force is shifted so far in time that its
+/// figures are invalid.
 pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
     let Some(fit) = LawFit::far(mean, dt_s, play_m) else { return Delay::None };
     let [left, without_delay, _] = fit.residuals;
@@ -83,8 +89,8 @@ pub(super) fn delay(mean: &Cycle, dt_s: f64, play_m: f64) -> Delay {
 }
 
 impl Repair {
-    /// What the averaged loop of a contact in gross slip asks for, and what is to be said of it. `late_s` was taken out of `mean`
-    /// already; it is part of the delay that is said.
+    /// The correction for the averaged loop of a contact in gross slip, and the findings to report.
+    /// `late_s` has already been removed from `mean`; it is included in the reported delay.
     pub fn of(mean: &Cycle, dt_s: f64, play_m: f64, late_s: f64) -> (Self, Vec<LoopFinding>) {
         let (mut repair, mut said) = (Self { late_points: late_s / dt_s, ..Self::default() }, Vec::new());
         let Some(fit) = LawFit::of(mean, dt_s, play_m) else { return (repair, said) };
@@ -113,33 +119,33 @@ impl Repair {
         (repair, said)
     }
 
-    /// A delay of the force alone, with its standard deviation.
+    /// A delay of the force only, with its standard deviation.
     pub fn in_step_by(late_s: f64, std_s: f64, dt_s: f64) -> Self {
         let unsure = if late_s == 0.0 { 0.0 } else { std_s / late_s.abs() };
         Self { late_points: late_s / dt_s, unsure, ..Self::default() }
     }
 
-    /// Whether there is anything to do.
+    /// Whether there is anything to correct.
     pub fn is_some(&self) -> bool {
         self.late_points != 0.0 || self.viscous != 0.0
     }
 
-    /// Whether the force is late.
+    /// Whether the force is delayed.
     pub fn is_late(&self) -> bool {
         self.late_points != 0.0
     }
 
-    /// What is not known of it, over it.
+    /// Relative uncertainty of the correction.
     pub fn unsure(&self) -> f64 {
         self.unsure
     }
 
-    /// The cycle with its force in step.
+    /// The cycle with its force aligned in time.
     pub fn in_step(&self, cycle: &Cycle) -> Cycle {
         Cycle { force_n: earlier(&cycle.force_n, self.late_points), ..cycle.clone() }
     }
 
-    /// The cycle with its friction alone.
+    /// The cycle with its friction force only.
     pub fn friction(&self, cycle: &Cycle) -> Cycle {
         let mut cycle = self.in_step(cycle);
         for (t, v) in cycle.force_n.iter_mut().zip(&cycle.velocity_m_per_s) {

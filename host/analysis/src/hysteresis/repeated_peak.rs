@@ -1,19 +1,22 @@
-//! Whether a peak of Im Δx/T is in every hit, or is noise.
+//! Checks whether a peak of Im Δx/T is present in every hit, or is noise.
 //!
-//! Of several hundred lines one is always the largest. Where T is weak the noise of Δx/T is largest too, so that the largest line of a loud
-//! measurement lies there and looks like a resonance. Hits that have nothing in common but the structure tell which it is.
+//! Of several hundred lines one is always the largest. Where T is weak the noise of Δx/T is also
+//! largest, so in a noisy measurement the largest line lies there and looks like a resonance.
+//! Independent groups of hits, which share only the structure, distinguish the two.
 
 use super::compliance::ContactCompliance;
 
-/// Groups of hits without which their scatter tells nothing.
+/// Fewest groups of hits needed to estimate their scatter.
 pub const FEWEST_GROUPS: usize = 3;
-/// Standard errors by which a peak must stand clear: of 600 lines of noise the largest reaches 4 in one of thirty measurements.
+/// Standard errors by which a peak must exceed the noise: the largest of 600 lines of noise reaches
+/// 4 in one of thirty measurements.
 pub const CLEAR: f64 = 5.0;
-/// Noise is taken from lines this near, Hz: a few groups at one line know their scatter badly.
+/// The noise is averaged over lines within this distance, Hz: a few groups at a single line give a
+/// poor estimate of the scatter.
 const NEAR_HZ: f64 = 5.0;
 
-/// |Im D| at `peak_hz` over its standard error, from groups of hits that are independent of one another, on the same lines. None with fewer
-/// than [`FEWEST_GROUPS`].
+/// |Im D| at `peak_hz` over its standard error, from independent groups of hits on the same lines.
+/// `None` with fewer than [`FEWEST_GROUPS`].
 pub fn over_noise(groups: &[ContactCompliance], peak_hz: f64) -> Option<f64> {
     if groups.len() < FEWEST_GROUPS {
         return None;
@@ -48,7 +51,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// Four groups of hits on a contact of 1, with noise that is large about 120 Hz, and perhaps a mode at 200 Hz.
+    /// Four groups of hits on a contact of compliance 1, with large noise near 120 Hz, and
+    /// optionally a mode at 200 Hz.
     fn groups(mode: f64, seed: u64) -> Vec<ContactCompliance> {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let frequency_hz: Vec<f64> = (0..=700).map(|l| 80.0 + 0.5 * f64::from(l)).collect();

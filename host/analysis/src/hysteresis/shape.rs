@@ -1,10 +1,11 @@
-//! What kind of loop it is: a straight line, an ellipse, microslip, gross slip.
+//! Shape of a loop: a straight line, an ellipse, microslip, gross slip.
 //!
-//! A stuck contact beside whatever linear structure gives T = k Δx + c Δẋ at every harmonic: a line, or an ellipse when something
-//! between the measured spots resonates. Slip does not: its loop has corners. So the residual of that two-parameter fit tells
-//! slip from ellipse, against the noise seen from cycle to cycle; where it is too small for that, the third harmonic of T tells microslip
-//! from damping; the phase tells ellipse from line; the final tangent
-//! tells gross slip from microslip.
+//! A stuck contact in any linear structure gives T = k Δx + c Δẋ at every harmonic: a line, or an
+//! ellipse if something between the measured points resonates. A slipping contact does not: its
+//! loop has corners. The residual of that two-parameter fit, compared with the scatter between
+//! cycles, therefore distinguishes slip from an ellipse. If the residual is too small for that, the
+//! third harmonic of T distinguishes microslip from damping. The phase distinguishes an ellipse
+//! from a line, and the final tangent gross slip from microslip.
 
 use super::cycle::Cycle;
 use super::cycles::Scatter;
@@ -19,8 +20,8 @@ use serde::Serialize;
 pub enum Shape {
     /// A straight line: the contact sticks, and k_eq is k_T.
     Stuck,
-    /// An ellipse, in which no slip is seen: a resonance hidden between the measured spots, damping, or a force out of step. It has no
-    /// k_T.
+    /// An ellipse without visible slip: a resonance hidden between the measured points, damping, or
+    /// a force shifted in time. It has no k_T.
     Elliptical,
     /// Part of the contact slips.
     Microslip,
@@ -28,12 +29,12 @@ pub enum Shape {
     GrossSlip,
 }
 
-/// The figures the shape was told from.
+/// The figures from which the shape was determined.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ShapeEvidence {
     /// rms residual of T = k Δx + c Δẋ on the averaged loop, over the rms of T.
     pub nonlinearity: f64,
-    /// The part of `nonlinearity` that noise explains, from the scatter between cycles.
+    /// The part of `nonlinearity` explained by noise, from the scatter between cycles.
     pub nonlinearity_noise: f64,
     /// Phase by which Δx lags T at the fundamental, degrees.
     pub phase_deg: f64,
@@ -41,36 +42,38 @@ pub struct ShapeEvidence {
     pub harmonics: [f64; 4],
     /// Tangent at the end of the strokes over the stiffness after the reversal.
     pub final_tangent: f64,
-    /// What dissipates: friction or a dashpot; none for few cycles.
+    /// Cause of the dissipation: friction or a dashpot; `None` with too few cycles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadratures: Option<Quadratures>,
 }
 
 impl ShapeEvidence {
-    /// Whether the loop is no ellipse, beyond the noise.
+    /// Whether the deviation from an ellipse exceeds the noise.
     pub(super) fn bends(&self) -> bool {
         self.nonlinearity > NONLINEAR.max(SIGNIFICANT * self.nonlinearity_noise)
     }
 
-    /// Whether noise could hide slip: the residual is more than instruments bend, and less than what would count.
+    /// Whether noise could hide slip: the residual exceeds the nonlinearity of instruments, but not
+    /// the noise threshold.
     pub(super) fn is_unsure(&self) -> bool {
         self.nonlinearity > NONLINEAR && !self.bends()
     }
 }
 
-/// Below this a residual may be the instruments' linearity.
+/// A smaller residual may be the nonlinearity of the instruments.
 const NONLINEAR: f64 = 0.01;
 
-/// Noise is exceeded by this factor before it counts as slip.
+/// The residual must exceed the noise by this factor to count as slip.
 const SIGNIFICANT: f64 = 4.0;
 
-/// A joint's own damping gives a few degrees of phase (1 % of loss per 0.6°); a resonance between the spots gives tens.
+/// A joint's own damping gives a few degrees of phase (1 % of loss per 0.6°); a resonance between
+/// the measured points gives tens.
 const ELLIPSE_DEG: f64 = 10.0;
 
-/// On a plateau the tangent is nearly nothing of the initial one.
+/// On a plateau the tangent is below this fraction of the initial one.
 const PLATEAU: f64 = 0.05;
 
-/// Tells the shape from the averaged loop and how the cycles scatter about it.
+/// Determines the shape from the averaged loop and the scatter of the cycles about it.
 pub(super) fn shape(
     mean: &Cycle,
     scatter: &Scatter,
@@ -81,7 +84,8 @@ pub(super) fn shape(
         .map(|i| mean.force_n[i] - k * mean.displacement_m[i] - c * mean.velocity_m_per_s[i])
         .collect();
     let force = rms(&mean.force_n);
-    // the mean of n cycles holds 1/n of their variance; the scatter about that mean only (n − 1)/n of it
+    // the mean of n cycles has 1/n of their variance; the scatter about that mean has only (n −
+    // 1)/n of it
     let others = scatter.cycles.saturating_sub(1).max(1) as f64;
     let nonlinearity_noise = (scatter.variance(k, c) / others).sqrt() / force;
     let strokes = strokes(mean);

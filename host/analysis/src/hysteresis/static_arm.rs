@@ -1,23 +1,24 @@
-//! The static arm between contact and load cells, identified: its effective mass m at the contact and the parallel path ρ in
-//! F = (1 + ρ) T + m ẍ_B (see [`super::correction`]).
+//! Identifies the static arm between contact and load cells: its effective mass m at the contact
+//! and the parallel path ρ in F = (1 + ρ) T + m ẍ_B (see [`super::correction`]).
 //!
-//! Two ways. **Hits on B alone**: the force at the contact is the hammer's, moved to the virtual point; both m and ρ come from one
-//! least-squares fit over frequency. **Stuck loops at several frequencies**: T/Δx = k/(1 + ρ) − m/(1 + ρ) · ẍ_B/Δx must give one k
-//! at all of them; ρ cannot be told from k this way and must be known. A contact with a hidden resonance gives no one k, and the fit's
-//! residual says so.
+//! There are two methods. **Hits on B alone**: the force at the contact is that of the hammer,
+//! transformed to the virtual point; both m and ρ come from one least-squares fit over frequency.
+//! **Stuck loops at several frequencies**: T/Δx = k/(1 + ρ) − m/(1 + ρ) · ẍ_B/Δx must give the same
+//! k at all of them; ρ cannot be separated from k this way and must be known. A contact with a
+//! hidden resonance has no common k, which shows in the fit's residual.
 
 use super::correction::Correction;
 use super::tones::Tones;
 use num_complex::Complex;
 use serde::Serialize;
 
-/// A worse fit (rms residual of the force, as a part of it) identifies nothing.
+/// A fit with a larger relative rms residual of the force is rejected.
 pub const WORST_RESIDUAL: f64 = 0.03;
 
-/// Levels must spread this far in frequency, highest over lowest.
+/// The frequencies of the levels must have at least this ratio, highest over lowest.
 const SPREAD: f64 = 1.5;
 
-/// Where the correction is from.
+/// Source of the correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
@@ -35,14 +36,15 @@ pub struct Identified {
     /// m and ρ.
     #[serde(flatten)]
     pub correction: Correction,
-    /// Where they are from.
+    /// Source of the values.
     pub basis: Basis,
-    /// rms of what the fit leaves of the force, as a part of it; 0 where they were given.
+    /// Relative rms residual of the force after the fit; 0 if the values were given.
     pub residual: f64,
 }
 
-/// From lines of (T/F, ẍ_B/F) with F known at the contact; `parallel_path` is fitted where it is not known. None without lines, or
-/// where the fit leaves too much or gives no mass.
+/// From lines of (T/F, ẍ_B/F) with F known at the contact; `parallel_path` is fitted if it is not
+/// given. `None` without lines, or if the fit leaves too large a residual or gives no positive
+/// mass.
 pub fn from_known_force(
     lines: &[(Complex<f64>, Complex<f64>)],
     parallel_path: Option<f64>,
@@ -62,7 +64,7 @@ pub fn from_known_force(
     accepted(factor - 1.0, mass, (squares / n).sqrt(), Basis::Hits)
 }
 
-/// From stuck levels; none with too few frequencies, or where no one stiffness explains them.
+/// From stuck levels; `None` with too few frequencies, or if no common stiffness explains them.
 pub fn from_levels(levels: &[Tones], parallel_path: f64) -> Option<Identified> {
     let (low, high) =
         levels.iter().fold((f64::INFINITY, 0.0f64), |(l, h), t| (l.min(t.omega_rad_s), h.max(t.omega_rad_s)));
@@ -93,7 +95,7 @@ fn accepted(parallel_path: f64, effective_mass_kg: f64, residual: f64, basis: Ba
     })
 }
 
-/// p, q of p x₀ + q x₁ = y; none where the two cannot be told apart.
+/// p, q of p x₀ + q x₁ = y; `None` if the two are linearly dependent.
 fn least_squares(rows: impl Iterator<Item = ([f64; 2], f64)>) -> Option<(f64, f64)> {
     let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for ([a, b], y) in rows {
@@ -145,7 +147,7 @@ mod tests {
         assert!((found.correction.parallel_path - PATH).abs() < 1e-9 && found.residual < 1e-9);
         let given = from_known_force(&lines, Some(PATH)).expect("a fit");
         assert!((given.correction.effective_mass_kg - MASS).abs() < 1e-6, "{given:?}");
-        // a force that is not the contact's
+        // a force other than the contact's
         let wrong: Vec<_> = lines.iter().map(|(t, a)| (t * 1.2, a * -0.4)).collect();
         assert_eq!(from_known_force(&wrong, Some(PATH)), None);
         assert_eq!(from_known_force(&[], None), None);

@@ -1,4 +1,4 @@
-//! A shaker's record: its cycles averaged, and everything that the average loop and its scatter say.
+//! Analyses a shaker record: averages its cycles, and evaluates the average loop and its scatter.
 
 use super::HysteresisError;
 use super::cycle::Cycle;
@@ -25,37 +25,38 @@ use crate::parallel::join;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// A frequency that was read off a record may be off by this part.
+/// Relative error of a frequency that was estimated from a record.
 const GUESSED: f64 = 5e-3;
 
-/// A stuck loop's phase is positive, or the force is late: below minus this, rad (a quarter of a degree),
+/// The phase of a stuck loop is positive. If it is below minus this, rad (a quarter of a degree),
 const LATE_RAD: f64 = 4.4e-3;
 
-/// and so many standard deviations.
+/// and below minus this many standard deviations, the force is delayed.
 const LATE_SIGNIFICANT: f64 = 5.0;
 
-/// A negative slope counts from so many standard errors on,
+/// A negative slope counts from this many standard errors,
 const REVERSED_SIGNIFICANT: f64 = 4.0;
 
-/// if the loop's area is no larger than this part of force times displacement.
+/// if the loop's area is at most this fraction of force times displacement.
 const NO_ENERGY: f64 = 0.05;
 
-/// Steady cycles may differ in amplitude by this part of their median,
+/// Steady cycles may differ in amplitude by this fraction of their median,
 const ALIKE: f64 = 0.04;
 
-/// in T₁/Δx₁ by this part,
+/// in T₁/Δx₁ by this fraction,
 const ALIKE_RATIO: f64 = 0.1;
 
-/// and by so many times what neighbouring cycles scatter by.
+/// or by this many times the scatter of neighbouring cycles, if that is more.
 const SCATTERS: f64 = 12.0;
 
-/// When the cycles of a record begin, and what is to be said of their frequency.
+/// Start times of a record's cycles, and the finding on their frequency.
 fn timing(
     record: &HysteresisRecord,
     frequency_hz: f64,
 ) -> Result<(Timing, Option<LoopFinding>), HysteresisError> {
     let runs_hz = match record.excitation_hz {
-        // what has no whole cycle at the stated frequency is refused with that frequency
+        // a record without a whole cycle at the stated frequency is refused, and the error states
+        // that frequency
         Some(stated_hz) => {
             Steady::new(record, Timing::steady(stated_hz))?;
             runs_at(record, stated_hz)?
@@ -74,7 +75,7 @@ fn timing(
         from_hz: timing.start_hz,
         to_hz: end_hz,
     };
-    // a guess from the record's spectrum may be off by a part of a line
+    // a frequency estimated from the record's spectrum may be off by a fraction of a line
     let drifts = (end_hz / timing.start_hz - 1.0).abs() > GUESSED;
     Ok((timing, (record.excitation_hz.is_some() || drifts).then_some(off)))
 }
@@ -84,8 +85,9 @@ fn amplitude(cycle: &Harmonics) -> f64 {
     cycle.displacement[0].norm()
 }
 
-/// The longest run of cycles that are alike in amplitude and in T₁/Δx₁: an excitation that grows or decays, and a contact that is
-/// loaded for the first time, have cycles at the beginning or the end that are not.
+/// The longest run of cycles that are alike in amplitude and in T₁/Δx₁. Cycles at the beginning or
+/// the end may differ if the excitation grows or decays, or if the contact is loaded for the first
+/// time.
 fn alike(cycles: &[Harmonics]) -> Range<usize> {
     let n = cycles.len();
     let ratio = |h: &Harmonics| h.force[0] / h.displacement[0];
@@ -103,7 +105,7 @@ fn alike(cycles: &[Harmonics]) -> Range<usize> {
     let inside = |values: &[f64], limit: f64| -> bool {
         let (low, high) =
             values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-        // nothing can be said of a value that is no number
+        // values that are not finite cannot be compared
         high - low <= limit || !(high - low).is_finite()
     };
     let all_inside =
@@ -124,8 +126,9 @@ fn alike(cycles: &[Harmonics]) -> Range<usize> {
     longest
 }
 
-/// What neighbouring values scatter by (standard deviation), from the lower quartile of their second differences: a steady change
-/// has none, and a beginning that grows has few of them. Nothing for three values or fewer.
+/// Standard deviation of the scatter between neighbouring values, from the lower quartile of their
+/// second differences: a steady change has none, and a growing beginning has few of them. Zero for
+/// three values or fewer.
 fn scatter(values: &[f64]) -> f64 {
     let mut changes: Vec<f64> =
         values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs() / 6f64.sqrt()).collect();
@@ -134,7 +137,7 @@ fn scatter(values: &[f64]) -> f64 {
     if changes.len() < 2 { 0.0 } else { changes[(changes.len() - 1) / 4] / 0.3186 }
 }
 
-/// The cycles that are alike, and what is to be said of the others.
+/// The cycles that are alike, and the finding on the others.
 fn steady_part<'a>(
     cycles: Steady<'a>,
     summed: &Summed,
@@ -168,9 +171,10 @@ fn steady_part<'a>(
     Ok((cycles.only(used), Some(said)))
 }
 
-/// The force against the motion, in loops that show no plateau: late by at least this.
+/// Delay of the force relative to the motion in loops without a plateau: a lower bound.
 fn late_at_least(quadratures: &Quadratures, frequency_hz: f64) -> Option<LoopFinding> {
-    // microslip takes energy, which a delay must have given back before any is missing
+    // microslip dissipates energy, so a delay must first cancel that before the loop's area turns
+    // negative
     let friction = if quadratures.slips() { 0.6 * -5.0 * quadratures.third } else { 0.0 };
     let ahead = friction - quadratures.first;
     let turn = TAU * frequency_hz;
@@ -182,7 +186,7 @@ fn late_at_least(quadratures: &Quadratures, frequency_hz: f64) -> Option<LoopFin
     })
 }
 
-/// A record's loops with each of these forces.
+/// Analyses a record's loops with each of these forces.
 ///
 /// # Errors
 /// No whole cycle, or nothing moves.
@@ -214,7 +218,7 @@ pub(super) fn shaker<const N: usize>(
     Ok(summed.map(|all| steady.loops(forces.next().flatten(), &all)))
 }
 
-/// What the loops of a steady record have in common, whichever force they show.
+/// Data common to the loops of a steady record, independent of the force used.
 struct SteadyRecord<'a> {
     record: &'a HysteresisRecord,
     cycles: Steady<'a>,
@@ -256,7 +260,7 @@ impl SteadyRecord<'_> {
         let play_m = play.map_or(0.0, |play| play.size_m);
         let not_put_right = match out_of_step {
             Delay::NotExplained(by_s, std_s) => Some((by_s, std_s)),
-            // in gross slip the corners tell a dashpot from a delay
+            // in gross slip the corners distinguish a dashpot from a delay
             Delay::OrDamped(by_s, std_s) if shape != Shape::GrossSlip => Some((by_s, std_s)),
             _ => None,
         };
@@ -374,14 +378,15 @@ impl SteadyRecord<'_> {
     }
 }
 
-/// Whether the force has the wrong sign: it falls where the contact is pushed, and the loop takes no energy. One beside a resonance
-/// may fall too, but takes some. `product` is that of both amplitudes, J.
+/// Whether the force has the wrong sign: it falls while the contact is pushed, and the loop
+/// dissipates no energy. The force near a resonance may fall too, but then energy is dissipated.
+/// `product` is that of both amplitudes, J.
 fn is_reversed(slope: &OverCycles, energy: &OverCycles, product: f64) -> bool {
     let error = slope.std / (slope.cycles as f64).sqrt();
     slope.mean < -REVERSED_SIGNIFICANT * error && energy.mean < NO_ENERGY * product
 }
 
-/// The interval opened by what is not known of a repair that moved it here from `before`.
+/// The interval widened by the uncertainty of a correction that moved the value here from `before`.
 fn widened(k: OverCycles, before: Option<f64>, unsure: f64) -> OverCycles {
     let more = before.map_or(0.0, |before| 2.0 * unsure * (k.mean - before).abs());
     OverCycles { ci95: k.ci95.map(|[low, high]| [low - more, high + more]), ..k }

@@ -1,57 +1,67 @@
 //! The stick part of a slipping loop, and its plateau.
 //!
-//! After each reversal the whole contact sticks again. The part used for k_T is chosen by *force*, as a part of the swing from one
-//! reversal to the next. Which part depends on how the contact lets go:
+//! After each reversal the whole contact sticks again. The part used for k_T is chosen by *force*,
+//! as a fraction of the swing from one reversal to the next. Which part depends on how the contact
+//! starts to slip:
 //!
-//! - Of a contact that slips as one the flank is straight up to the plateau, and 10 to 90 % of it are read. When such a contact sticks
-//!   again the structure goes on and rings, with 3 ms where the whole flank takes 4 to 8 ms, and the load cells feel the static
-//!   arm's inertia in that. A shorter part holds half a ring: 20 to 40 % reads anything from −6 to +4 % of the stiffness.
-//! - Where microslip bends the flank, the first 20 %, taken back to the reversal by what its halves show: later parts read too little (half the swing gives 132 for 143.7 N/µm on an
-//!   Iwan contact).
-//! - Without a plateau nothing rings: 20 to 40 %, clear of the reversal where Δx hardly moves; or the first 20 % where it has bent by then.
+//! - If the whole contact slips at the same force, the flank is straight up to the plateau, and 10
+//!   to 90 % of it are used. When such a contact sticks again the structure rings, with a period of
+//!   3 ms where the whole flank takes 4 to 8 ms, and the ringing accelerates the static arm, whose
+//!   inertia acts on the load cells. A shorter part covers only half a period: 20 to 40 % gives
+//!   errors from −6 to +4 % of the stiffness.
+//! - If microslip bends the flank, the first 20 % are used, extrapolated to the reversal from the
+//!   slopes of its halves: later parts underestimate it (half the swing gives 132 for 143.7 N/µm on
+//!   an Iwan contact).
+//! - Without a plateau there is no ringing: 20 to 40 % are used, clear of the reversal where Δx
+//!   hardly moves; or the first 20 % if the flank has bent by then.
 
 use super::cycle::Cycle;
 use super::loops::slope;
 
-/// A part of the force's swing after a reversal, from its first to its second fraction.
+/// A part of the force's swing after a reversal, from the first to the second fraction.
 pub(super) type Part = [f64; 2];
 
-/// Where a straight flank up to a plateau is read.
+/// Part used of a straight flank up to a plateau.
 const FLANK: Part = [0.10, 0.90];
 
-/// Its halves.
+/// Its halves, used to check that it is straight.
 const HALVES: [Part; 2] = [[0.10, 0.50], [0.50, 0.90]];
 
-/// Where a flank with play is read: the play comes where the force is zero, half the swing after the reversal.
+/// Part used of a flank with play: the play occurs where the force is zero, half the swing after
+/// the reversal.
 pub(super) const BEFORE_PLAY: Part = [0.10, 0.40];
 
-/// A flank counts as straight with this much of the earlier half's slope in the later one: ringing alone leaves 0.95 and more, an Iwan
-/// contact's halves differ by a third.
+/// A flank counts as straight if the slope of its later half is at least this fraction of that of
+/// the earlier half: ringing alone leaves 0.95 or more, whereas the halves of an Iwan contact
+/// differ by a third.
 const STRAIGHT_FLANK: f64 = 0.9;
 
-/// Where a straight contact without a plateau is read.
+/// Part used of a straight contact without a plateau.
 const LATE: Part = [0.20, 0.40];
 
-/// Where a bending one is read: the first samples after a reversal hardly move, and their displacement is noise of the integration.
+/// Part used of a bending one. The first samples after a reversal are excluded: they hardly move,
+/// and their displacement is noise of the integration.
 const EARLY: Part = [0.02, 0.20];
 
-/// The later part counts as straight with this much of the earlier one's slope.
+/// The flank counts as straight if the later part has at least this fraction of the earlier one's
+/// slope.
 const STRAIGHT: f64 = 0.95;
 
-/// Fewer samples on both branches make no slope.
+/// Fewest samples on both branches needed for a slope.
 const FEWEST_SAMPLES: usize = 6;
 
 /// The plateau begins where the force first reaches this fraction of its swing.
 const PLATEAU_START: f64 = 0.98;
 
-/// The last part of each stroke by displacement in which the final tangent is taken.
+/// Fraction of each stroke, at its end and measured by displacement, in which the final tangent is
+/// taken.
 const STROKE_END: f64 = 0.15;
 
 /// One stroke from a reversal to the next: indices into the cycle, in order, wrapping around.
 type Stroke = Vec<usize>;
 
-/// The two strokes of a loop, split at the extremes of `guide`'s displacement (the averaged loop, so that single cycles are all split
-/// alike and their noise does not move the reversal).
+/// The two strokes of a loop, split at the extremes of `guide`'s displacement. `guide` is the
+/// averaged loop, so that all cycles are split alike and their noise does not shift the reversal.
 pub(super) fn strokes(guide: &Cycle) -> [Stroke; 2] {
     let x = &guide.displacement_m;
     let extreme =
@@ -64,14 +74,14 @@ pub(super) fn strokes(guide: &Cycle) -> [Stroke; 2] {
     [run(top, bottom), run(bottom, top)]
 }
 
-/// How far the force has gone of its swing over the stroke, 0…1, for each of the stroke's samples.
+/// Progress of the force through its swing over the stroke, 0…1, for each of the stroke's samples.
 fn progress(cycle: &Cycle, stroke: &Stroke) -> Vec<f64> {
     let (Some(&first), Some(&last)) = (stroke.first(), stroke.last()) else { return vec![] };
     let (from, to) = (cycle.force_n[first], cycle.force_n[last]);
     stroke.iter().map(|&i| (cycle.force_n[i] - from) / (to - from)).collect()
 }
 
-/// The part in which a contact without a plateau is read, told from the averaged loop.
+/// The part to use for a contact without a plateau, chosen from the averaged loop.
 pub(super) fn first_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
     match (slope_over(guide, strokes, EARLY), slope_over(guide, strokes, LATE)) {
         (Some(early), Some(late)) if late < STRAIGHT * early => EARLY,
@@ -80,7 +90,7 @@ pub(super) fn first_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
     }
 }
 
-/// The part in which a contact with a plateau is read, told from the averaged loop.
+/// The part to use for a contact with a plateau, chosen from the averaged loop.
 pub(super) fn flank_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
     match HALVES.map(|half| slope_over(guide, strokes, half)) {
         [Some(early), Some(late)] if late < STRAIGHT_FLANK * early => EARLY,
@@ -88,7 +98,8 @@ pub(super) fn flank_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
     }
 }
 
-/// k_T: pooled least-squares slope of T on Δx over this part of both strokes, N/m. None when too few samples lie in it.
+/// k_T: pooled least-squares slope of T on Δx over this part of both strokes, N/m. `None` with too
+/// few samples in it.
 pub(super) fn slope_over(cycle: &Cycle, strokes: &[Stroke; 2], [start, end]: Part) -> Option<f64> {
     let (mut xs, mut ts) = (Vec::new(), Vec::new());
     for stroke in strokes {
@@ -99,7 +110,7 @@ pub(super) fn slope_over(cycle: &Cycle, strokes: &[Stroke; 2], [start, end]: Par
             .filter(|(_, p)| *p >= start)
             .map(|(&i, _)| (cycle.displacement_m[i], cycle.force_n[i]))
             .unzip();
-        // each stroke has an intercept of its own
+        // each stroke has a separate intercept
         for values in [&mut x, &mut t] {
             let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
             for v in values.iter_mut() {
@@ -112,14 +123,16 @@ pub(super) fn slope_over(cycle: &Cycle, strokes: &[Stroke; 2], [start, end]: Par
     (xs.len() >= FEWEST_SAMPLES).then(|| slope(&xs, &ts))
 }
 
-/// k_T where the flank bends: the slopes of both halves of the first part, taken back to the reversal along a straight line. Of an Iwan
-/// contact whose sliders begin to slip at nothing the part as a whole reads 6 % too little, of a Dahl contact 11 %. Where a
-/// half holds too few samples, the whole part is read.
+/// k_T if the flank bends: the slopes of both halves of the first part, extrapolated linearly to
+/// the reversal. For an Iwan contact whose weakest sliders slip at zero force, the slope of the
+/// part as a whole is 6 % too low, for a Dahl contact 11 %. If a half has too few samples, the
+/// slope of the whole part is returned.
 pub(super) fn tangent_at_reversal(cycle: &Cycle, strokes: &[Stroke; 2]) -> Option<f64> {
     let [start, end] = EARLY;
     let middle = 0.5 * (start + end);
     match (slope_over(cycle, strokes, [start, middle]), slope_over(cycle, strokes, [middle, end])) {
-        // from the first half's middle to the reversal, over the distance of both middles
+        // from the middle of the first half to the reversal, relative to the distance between both
+        // middles
         (Some(first), Some(second)) => {
             Some(first + (first - second) * 0.5 * (start + middle) / (middle - start))
         }
@@ -127,7 +140,7 @@ pub(super) fn tangent_at_reversal(cycle: &Cycle, strokes: &[Stroke; 2]) -> Optio
     }
 }
 
-/// Whether this is the part of a flank that bends.
+/// Whether this is the part used for a bending flank.
 pub(super) fn bends(part: Part) -> bool {
     part == EARLY
 }
@@ -148,8 +161,8 @@ pub(super) fn final_tangent(cycle: &Cycle, strokes: &[Stroke; 2], stiffness: f64
     tangents.iter().sum::<f64>() / tangents.len().max(1) as f64 / stiffness
 }
 
-/// The friction limit μN, N: half the distance between the plateaus' medians. The median, not the peak: load cells ring when a
-/// contact lets go (241 N for 180 N).
+/// The friction limit μN, N: half the distance between the plateaus' medians. The median is used
+/// rather than the peak because load cells ring when a contact starts to slip (241 N for 180 N).
 pub(super) fn friction_limit(cycle: &Cycle, strokes: &[Stroke; 2]) -> Option<f64> {
     let mut levels = strokes.iter().map(|stroke| {
         let progress = progress(cycle, stroke);

@@ -1,8 +1,9 @@
-//! Sums over long rows of numbers, in lanes: one running sum alone waits for its own last addition.
+//! Sums over long arrays in parallel lanes: a single running sum would wait for each addition to
+//! finish.
 
 use crate::vectors::wide;
 
-/// Sums that run side by side.
+/// Number of parallel partial sums.
 const LANES: usize = 8;
 
 /// Σ x.
@@ -19,12 +20,12 @@ pub(super) fn sum(x: &[f64]) -> f64 {
     sums.iter().chain(rest).sum()
 }
 
-/// Mean of x; NaN of nothing.
+/// Mean of x; NaN for an empty array.
 pub(super) fn mean(x: &[f64]) -> f64 {
     sum(x) / x.len() as f64
 }
 
-/// Σ x y over the shorter of both.
+/// Σ x y over the length of the shorter one.
 pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     let ((xs, x), (ys, y)) = (x[..n].as_chunks::<LANES>(), y[..n].as_chunks::<LANES>());

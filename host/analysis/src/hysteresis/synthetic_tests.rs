@@ -1,4 +1,5 @@
-//! Closed forms: Jenkins and Iwan contacts of any amplitude, straight lines, damped ellipses, periods of no whole number of samples.
+//! Comparison with closed forms: Jenkins and Iwan contacts of any amplitude, straight lines, damped
+//! ellipses, periods that are not a whole number of samples.
 
 use super::*;
 use proptest::prelude::*;
@@ -6,14 +7,15 @@ use std::f64::consts::TAU;
 
 const FS: f64 = 51_200.0;
 
-/// Parallel Jenkins elements (stiffness N/m, limit N) under Δx = X sin ωt; velocities of A, B at rest.
+/// Parallel Jenkins elements (stiffness N/m, limit N) under Δx = X sin ωt; velocities of A, B at
+/// rest.
 fn record(elements: &[(f64, f64)], amplitude_m: f64, frequency_hz: f64, damping: f64) -> HysteresisRecord {
     let w = TAU * frequency_hz;
     let n = (8.3 * FS / frequency_hz) as usize;
     let mut sliders = vec![0.0; elements.len()];
     let mut force = Vec::new();
     let mut velocity = Vec::new();
-    // one cycle ahead, so that the record starts steady
+    // start one cycle earlier, so that the record begins in the steady state
     let ahead = (FS / frequency_hz).ceil() as usize;
     for i in 0..ahead + n {
         let t = (i as f64 - ahead as f64) / FS;
@@ -46,7 +48,7 @@ proptest! {
         let amplitude = over * limit / k;
         let got = analyse(&record(&[(k, limit)], amplitude, f, 0.0)).expect("a loop");
         prop_assert_eq!(got.shape, Shape::GrossSlip);
-        // corners fall between samples: some 400 to a cycle
+        // corners fall between samples, of which a cycle has about 400
         let k_t = got.k_t_n_per_m.expect("a stick part").mean;
         prop_assert!((k_t / k - 1.0).abs() < 0.01, "{} for {}", k_t, k);
         let energy = 4.0 * limit * (amplitude - limit / k);
@@ -63,14 +65,15 @@ proptest! {
         let phase = loss.atan().to_degrees();
         prop_assume!((phase.abs() - 10.0).abs() > 0.5);
         prop_assert_eq!(got.shape, if phase.abs() > 10.0 { Shape::Elliptical } else { Shape::Stuck });
-        // the trapezoid loses (ω dt)² / 12 of a hundred samples to a cycle, interpolation as much again
+        // the trapezoid rule loses (ω dt)² / 12 at a hundred samples per cycle, interpolation as
+        // much again
         prop_assert!((got.k_eq_n_per_m.mean / k - 1.0).abs() < 2e-3);
         prop_assert!((got.phase_deg - phase).abs() < 0.2);
         prop_assert_eq!(got.k_t_n_per_m.is_some(), got.shape == Shape::Stuck);
     }
 }
 
-/// An Iwan contact of 40 elements: part of it slips at small amplitude, all of it at large.
+/// An Iwan contact of 40 elements: some slip at small amplitude, all at large amplitude.
 #[test]
 fn microslip_lies_between_stuck_and_gross_slip() {
     let elements: Vec<(f64, f64)> = (0..40).map(|i| (4e6, 0.25 + 7.0 * i as f64 / 39.0)).collect();
@@ -83,20 +86,21 @@ fn microslip_lies_between_stuck_and_gross_slip() {
     ] {
         let got = analyse(&record(&elements, amplitude, 80.0, 0.0)).expect("a loop");
         assert_eq!(got.shape, shape, "{amplitude}: {:?}", got.shape_evidence);
-        // a fifth of the swing already holds some microslip
+        // a fifth of the swing already includes some microslip
         let k_t = got.k_t_n_per_m.expect("a stick part").mean;
         assert!((k_t / k - 1.0).abs() < 0.1, "{amplitude}: {k_t} for {k}");
     }
 }
 
-/// When a contact sticks again the structure rings on, and load cells that carry an arm feel its inertia: T + m ẍ_B is the contact's, T
-/// is not. Over a part of the flank no longer than a ring that reads as stiffness; over the whole flank it does not.
+/// When a contact sticks again the structure keeps ringing, and load cells that carry an arm
+/// measure its inertia: T + m ẍ_B is the contact's force, T is not. Over a part of the flank no
+/// longer than a ringing period this looks like stiffness; over the whole flank it does not.
 #[test]
 fn a_flank_that_rings_is_read_as_a_whole() {
     let (k, limit, amplitude, frequency) = (180e6, 180.0, 5e-6, 28.0);
     for ring_hz in [270.0, 310.0, 350.0] {
         let (w, ring) = (TAU * frequency, TAU * ring_hz);
-        // since the last reversal, s
+        // time since the last reversal, s
         let since = |t: f64| (t - 0.25 / frequency).rem_euclid(0.5 / frequency);
         let sign =
             |t: f64| if ((t - 0.25 / frequency) * frequency).rem_euclid(1.0) < 0.5 { -1.0 } else { 1.0 };
@@ -110,7 +114,7 @@ fn a_flank_that_rings_is_read_as_a_whole() {
             slider = x - contact / k;
             if i >= n {
                 x_m.push(x);
-                // 1.5 kg that move with the ring as far as the contact yields
+                // 1.5 kg that move with the ringing as far as the contact yields
                 force_n.push(contact + 1.5 * ring * ring * rung(t));
             }
         }
@@ -139,7 +143,7 @@ fn displacements_serve_as_well_as_velocities_and_a_steady_record_needs_no_freque
     one.excitation_hz = None;
     let got = analyse(&one).expect("a loop");
     assert_eq!(got.kind, Kind::Shaker);
-    // eight cycles give the frequency to a thousandth or so
+    // eight cycles determine the frequency to about one part in a thousand
     assert!((got.frequency_hz / 80.0 - 1.0).abs() < 5e-3, "{}", got.frequency_hz);
     assert!((got.k_eq_n_per_m.mean / by_velocity.k_eq_n_per_m.mean - 1.0).abs() < 0.03);
 }

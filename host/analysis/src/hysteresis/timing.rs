@@ -1,4 +1,4 @@
-//! When the cycles of a steady record begin: at the stated frequency, or as they came.
+//! Start times of the cycles of a steady record: at the stated frequency, or at the measured one.
 
 use super::HysteresisError;
 use super::dominant_frequency::{dominant_frequency, level};
@@ -9,50 +9,53 @@ use crate::parallel::prelude::*;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Phase that may build up over a record before its cycles count as off, rad: what less does to an average is below 1 in 1000.
+/// Phase deviation over a record from which its cycles count as off, rad: a smaller one changes an
+/// average by less than 1 in 1000.
 const OFF_RAD: f64 = 0.05;
 
-/// It must be so many times what the cycles' scatter explains.
+/// The deviation must be this many times what the scatter of the cycles explains.
 const SIGNIFICANT: f64 = 8.0;
 
-/// What the cycles may scatter about a steady drift for that drift to be believed, rad.
+/// Largest scatter of the cycles about a steady drift for which the drift is accepted, rad.
 const SCATTER_RAD: f64 = 0.5;
 
-/// Fewer cycles show no drift: only another frequency than the stated one,
+/// With fewer cycles no drift can be found, only a frequency that differs from the stated one,
 const FEWEST_CYCLES: usize = 8;
 
-/// and fewer than these not even that.
+/// and with fewer than these not even that.
 const FEWEST_PHASES: usize = 3;
 
-/// The phases are looked at again, about the frequency found, if it is further off than this part: a cycle cut too long or too
-/// short holds a part of its neighbour.
+/// The phases are computed again, at the frequency found, if it differs by more than this fraction:
+/// a cycle cut too long or too short contains a part of its neighbour or lacks a part of its own.
 const FURTHER: f64 = 5e-3;
 
-/// A stated frequency is that of the record if its tone alone has this part of the force's mean square in stretches of so many
-/// cycles. A square wave's fundamental has 0.81 of it.
+/// A stated frequency is accepted if its tone alone has this fraction of the force's mean square in
+/// stretches of this many cycles. A square wave's fundamental has 0.81 of it.
 const EXPLAINED: f64 = 0.5;
 const STRETCH: f64 = 16.0;
 
-/// The strongest frequency is the stated one if it lies within this part of a line (one over the record's duration) of it.
+/// The strongest frequency is the stated one if they differ by less than this fraction of a line
+/// (one over the record's duration).
 const SAME_LINE: f64 = 0.7;
 
-/// In the motion, the other frequency must have so many times the power of the stated one.
+/// In the motion, the other frequency must have this many times the power of the stated one.
 const STRONGER: f64 = 4.0;
 
-/// The stated frequency is in a signal if it has this part of the power of the strongest one.
+/// The stated frequency is present in a signal if it has this fraction of the power of the
+/// strongest one.
 const PRESENT: f64 = 0.0625;
 
-/// Frequency over the time of a record, a straight line.
+/// Frequency as a linear function of time over a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Timing {
     /// At the first sample, Hz.
     pub start_hz: f64,
-    /// Hz/s.
+    /// Rate of change, Hz/s.
     pub rate_hz_per_s: f64,
 }
 
 impl Timing {
-    /// One frequency all along.
+    /// A constant frequency.
     pub fn steady(frequency_hz: f64) -> Self {
         Self { start_hz: frequency_hz, rate_hz_per_s: 0.0 }
     }
@@ -66,24 +69,25 @@ impl Timing {
         2.0 * cycle / (self.start_hz + root)
     }
 
-    /// Cycles in so much time.
+    /// Number of cycles in this time.
     pub fn cycles(&self, time_s: f64) -> f64 {
         (self.start_hz + 0.5 * self.rate_hz_per_s * time_s) * time_s
     }
 
-    /// Hz.
+    /// Frequency at this time, Hz.
     pub fn at(&self, time_s: f64) -> f64 {
         self.start_hz + self.rate_hz_per_s * time_s
     }
 
-    /// The timing that the phase of `force` shows, if it is not `frequency_hz` all along.
+    /// The timing derived from the phase of `force`; `None` if it runs at `frequency_hz`
+    /// throughout.
     pub fn tracked(force: &[f64], fs_hz: f64, frequency_hz: f64) -> Option<Self> {
         let first = Self::tracked_near(force, fs_hz, frequency_hz)?;
         let middle_hz = first.at(0.5 * force.len() as f64 / fs_hz);
         if (middle_hz / frequency_hz - 1.0).abs() < FURTHER {
             return Some(first);
         }
-        // none means that the frequency found first is that of the whole record
+        // `None` means that the frequency found first holds for the whole record
         Some(Self::tracked_near(force, fs_hz, middle_hz).unwrap_or(Self::steady(middle_hz)))
     }
 
@@ -92,12 +96,12 @@ impl Timing {
             return None;
         }
         let period = fs_hz / frequency_hz;
-        // rounding must not make 7 cycles of 8
+        // tolerance, so that rounding does not make 7 cycles of 8
         let cycles = (force.len() as f64 / period + 1e-6).floor() as usize;
         if cycles < FEWEST_PHASES {
             return None;
         }
-        // a drift is a bow of the phase, which a few cycles do not show
+        // a drift shows as a curvature of the phase, which a few cycles do not resolve
         let terms = if cycles < FEWEST_CYCLES { 2 } else { 3 };
         let turn = TAU / period;
         let tone = |c: usize| {
@@ -119,13 +123,13 @@ impl Timing {
             last += wrapped(*phase - last);
             *phase = last;
         }
-        // phase over u = -1…1 by Legendre's polynomials, which are orthogonal over many cycles
+        // phase over u = -1…1 in Legendre polynomials, which are orthogonal over many cycles
         let n = cycles as f64;
         let u = |c: usize| (2.0 * c as f64 + 1.0) / n - 1.0;
         let basis = |c: usize| [1.0, u(c), 0.5 * (3.0 * u(c).powi(2) - 1.0)];
         let mut fit = [0.0; 3];
         for _ in 0..3 {
-            // a few rounds, because sums over finitely many cycles are not quite orthogonal
+            // iterate, because sums over finitely many cycles are not quite orthogonal
             let mut left = [0.0; 3];
             let mut norm = [0.0; 3];
             for (c, phase) in phases.iter().enumerate() {
@@ -143,22 +147,24 @@ impl Timing {
             (phase - (0..3).map(|i| fit[i] * b[i]).sum::<f64>()).powi(2)
         };
         let scatter = (phases.iter().enumerate().map(rest).sum::<f64>() / (n - terms as f64)).sqrt();
-        // from end to end the line rises by twice its slope, the parabola by 1.5 of its factor
+        // from end to end the linear term rises by twice its coefficient, the quadratic one by 1.5
+        // times
         let (line, bow) = (2.0 * fit[1], 1.5 * fit[2]);
         let limit = |over: f64| OFF_RAD.max(SIGNIFICANT * scatter * over / n.sqrt());
         if scatter > SCATTER_RAD || (line.abs() < limit(3.5) && bow.abs() < limit(3.4)) {
             return None;
         }
         let time_s = cycles as f64 / frequency_hz;
-        // dφ/du at the beginning and the end, and u goes from -1 to 1
+        // dφ/du at the beginning and the end; u goes from -1 to 1
         let [from_hz, to_hz] =
             [-1.0, 1.0].map(|u| frequency_hz + (fit[1] + 3.0 * fit[2] * u) * 2.0 / time_s / TAU);
         Some(Self { start_hz: from_hz, rate_hz_per_s: (to_hz - from_hz) / time_s })
     }
 }
 
-/// The frequency that a record with a stated one runs at: the stated one, or that of force and motion where both have next to
-/// nothing at the stated one. Differences below a line's width are left to [`Timing::tracked`].
+/// The actual frequency of a record with a stated one: the stated one, or that of force and motion
+/// if both have next to no power at the stated one. Differences below a line's width are left to
+/// [`Timing::tracked`].
 ///
 /// # Errors
 /// Neither force nor motion runs at the stated frequency, and they do not agree.
@@ -176,7 +182,7 @@ pub(super) fn runs_at(record: &HysteresisRecord, stated_hz: f64) -> Result<f64, 
         Relative::Displacement(x) => (x, 0),
     };
     let motion = level(&motion);
-    // of displacement, from velocity too
+    // power of the displacement, also if velocity was measured
     let power = |f: f64| line_power(&motion, f / fs_hz) / f.powi(2 * order);
     let motion_hz = dominant_frequency(&motion, fs_hz).unwrap_or(force_hz);
     let [stated, of_force, of_motion] = [stated_hz, force_hz, motion_hz].map(power);
@@ -190,7 +196,8 @@ pub(super) fn runs_at(record: &HysteresisRecord, stated_hz: f64) -> Result<f64, 
     Err(HysteresisError::OtherFrequency { stated_hz, force_hz, motion_hz })
 }
 
-/// The part of a signal's mean square about its mean that a tone of this frequency has, in stretches of [`STRETCH`] cycles.
+/// Fraction of a signal's variance that a tone of this frequency has, in stretches of [`STRETCH`]
+/// cycles.
 fn explained(x: &[f64], fs_hz: f64, frequency_hz: f64) -> f64 {
     let period = fs_hz / frequency_hz;
     let cycles = (x.len() as f64 / period + 1e-6).floor().clamp(1.0, STRETCH);
@@ -198,7 +205,8 @@ fn explained(x: &[f64], fs_hz: f64, frequency_hz: f64) -> f64 {
     let of = |x: &[f64]| {
         let n = x.len() as f64;
         let rest = mean(x);
-        // the mean's own part of the sum goes out, which only counts where the stretch is no whole number of cycles
+        // remove the mean's contribution to the sum, which matters only if the stretch is not a
+        // whole number of cycles
         let turn = -TAU / period;
         let ones = Complex::from_polar(1.0, turn * n) - 1.0;
         let constant = ones / (Complex::from_polar(1.0, turn) - 1.0) * rest;
@@ -210,17 +218,18 @@ fn explained(x: &[f64], fs_hz: f64, frequency_hz: f64) -> f64 {
     if all > 0.0 { tone / all } else { 1.0 }
 }
 
-/// |X|² at a frequency (turns per sample), through a Hann window.
+/// |X|² at a frequency (cycles per sample), with a Hann window.
 fn line_power(x: &[f64], frequency: f64) -> f64 {
     let n = x.len() as f64;
     let at = |turns: f64| line_sum(x, -TAU * turns);
-    // the window is half a constant, less a quarter of one turn each way; it is centred by half a sample
+    // the window is half a constant, minus a quarter of one turn in each direction; it is centred
+    // by half a sample
     let half = Complex::from_polar(1.0, 0.5 * TAU / n);
     let [below, above] = [frequency - 1.0 / n, frequency + 1.0 / n].map(at);
     (0.5 * at(frequency) - 0.25 * (half * below + half.conj() * above)).norm_sqr()
 }
 
-/// Into −π…π.
+/// Wraps to −π…π.
 fn wrapped(phase: f64) -> f64 {
     phase - TAU * (phase / TAU).round()
 }

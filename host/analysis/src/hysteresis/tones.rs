@@ -1,4 +1,4 @@
-//! A steady record as complex amplitudes, stretch by stretch.
+//! A steady record as complex amplitudes, one per stretch.
 
 use super::HysteresisError;
 use super::record::{HysteresisRecord, RelativeMotion};
@@ -6,10 +6,10 @@ use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Fewest cycles of a stretch: over these a mean, a cosine and a sine are told apart.
+/// Fewest cycles of a stretch: enough to separate a mean, a cosine and a sine.
 const FEWEST_CYCLES: f64 = 4.0;
 
-/// Complex amplitudes of one steady level, or of a stretch of it, in step with one another.
+/// Complex amplitudes of one steady level, or of a stretch of it, with a common phase reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tones {
     /// Circular frequency, rad/s.
@@ -23,16 +23,17 @@ pub struct Tones {
 }
 
 impl Tones {
-    /// Of a steady record of known excitation, over its whole cycles.
+    /// Of a steady record of known excitation frequency, over its whole cycles.
     ///
     /// # Errors
-    /// The signals do not fit together, or there is no excitation frequency or whole cycle.
+    /// The signals do not match, or there is no excitation frequency or whole cycle.
     pub fn of(record: &HysteresisRecord) -> Result<Self, HysteresisError> {
-        // as many as are asked for, or an error
+        // returns exactly one stretch, or an error
         of_stretches(record, |_| 1).map(|one| one[0])
     }
 
-    /// Of at most `count` stretches of whole cycles, one after the other. Their scatter holds the noise and whatever drifts.
+    /// Of at most `count` successive stretches of whole cycles. Their scatter includes the noise
+    /// and any drift.
     ///
     /// # Errors
     /// As [`Tones::of`]; fewer than four cycles.
@@ -46,7 +47,7 @@ impl Tones {
     }
 }
 
-/// As many stretches as `count` says of a record's whole cycles.
+/// Amplitudes of the number of stretches that `count` returns for a record's whole cycles.
 fn of_stretches(
     record: &HysteresisRecord,
     count: impl Fn(f64) -> usize,
@@ -77,8 +78,8 @@ fn of_stretches(
     (0..count).map(of).collect::<Option<_>>().ok_or_else(none)
 }
 
-/// Complex amplitude of x = Re(X e^(iφn)) + mean by least squares, with n counted from `first`: exact where a period is no whole number of
-/// samples.
+/// Complex amplitude of x = Re(X e^(iφn)) + mean by least squares, with n counted from `first`:
+/// exact even if a period is not a whole number of samples.
 fn amplitude(x: &[f64], first: usize, turn: f64) -> Option<Complex<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for (i, value) in x.iter().enumerate() {

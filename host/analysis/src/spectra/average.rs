@@ -1,4 +1,5 @@
-//! Spectra of many hits, one at a time: auto- and cross-spectra accumulate, the signals are gone when the hit is in.
+//! Spectra of many hits, one hit at a time: only the auto- and cross-spectra are accumulated; the
+//! signals of a hit need not be kept.
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
@@ -15,14 +16,14 @@ use num_complex::Complex;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Hits that are added together: enough that no core waits for another, few enough that their force spectra are small beside
-/// the records.
+/// Hits that are summed together: enough that no core waits for another, few enough that their
+/// force spectra are small compared with the records.
 const TOGETHER: usize = 8;
 
-/// Writes the windowed force of a hit, by its number.
+/// Writes the windowed force of a hit, given its index.
 pub type ForceOf<'a> = dyn Fn(usize, &mut [f64]) + Sync + 'a;
 
-/// A windowed response of a hit, by the numbers of hit and output.
+/// Returns a windowed response of a hit, given the indices of hit and output.
 pub type ResponseOf<'a> = dyn Fn(usize, usize) -> Windowed<'a> + Sync + 'a;
 
 /// Sums of spectra over the hits so far.
@@ -31,11 +32,11 @@ pub struct SpectraAverage {
     samples: usize,
     transform: Arc<RecordTransform>,
     hits: usize,
-    /// In the transform's order, as all sums are.
+    /// In the transform's order of lines, as all sums are.
     s_ff: Vec<f64>,
-    /// Every line.
+    /// All lines.
     all: Order,
-    /// The lines that the outputs' sums hold.
+    /// The lines for which the outputs are summed.
     band: Order,
     outputs: Vec<Output>,
     failed: Option<SpectraError>,
@@ -43,12 +44,12 @@ pub struct SpectraAverage {
     kept_force: Vec<Vec<Complex<f64>>>,
 }
 
-/// A response and its sums, in lent memory: they live as long as one cell's average.
+/// A response and its sums, in reused buffers: they live as long as one cell's average.
 struct Output {
     s_xf: Lent,
-    /// Two real numbers in each complex one.
+    /// Two real numbers are stored in each complex one.
     s_xx: Lent,
-    /// The lines of every hit, where they are kept.
+    /// The lines of every hit, if hits are kept.
     kept: Vec<Vec<Complex<f64>>>,
 }
 
@@ -58,7 +59,7 @@ impl Output {
     }
 }
 
-/// The sums that the lines of a hit enter, and its force at every line.
+/// The sums to which the lines of a hit are added, and its force at every line.
 struct Sums<'a> {
     all: &'a Order,
     band: &'a Order,
@@ -76,7 +77,7 @@ impl Lines for Sums<'_> {
     }
 }
 
-/// Adds the lines x of a response with those of its force to the sums.
+/// Adds the lines x of a response and those of the force to the sums.
 #[inline]
 fn add(
     s_xf: &mut [Complex<f64>],
@@ -102,7 +103,8 @@ impl SpectraAverage {
         Self::of_band(fs_hz, samples, outputs, [f64::NEG_INFINITY, f64::INFINITY])
     }
 
-    /// The same, which sums the responses at the lines with `low_hz` ≤ f ≤ `high_hz` alone; the force is summed at all of them.
+    /// The same, but responses are summed only at the lines with `low_hz` ≤ f ≤ `high_hz`; the
+    /// force is summed at all lines.
     pub fn of_band(fs_hz: f64, samples: usize, outputs: usize, [low_hz, high_hz]: [f64; 2]) -> Self {
         let transform = RecordTransform::of(samples);
         let mut average = SpectraAverage {
@@ -131,7 +133,8 @@ impl SpectraAverage {
         line as f64 * self.fs_hz / self.samples as f64
     }
 
-    /// Keeps the spectra of every hit, so that `finish` can leave each out in turn: hits × channels × lines complex numbers.
+    /// Keeps the spectra of every hit, so that `finish` can leave out each of them: hits × channels
+    /// × lines complex numbers.
     #[must_use]
     pub fn with_jackknife(mut self) -> Self {
         self.keep_hits = true;
@@ -141,7 +144,8 @@ impl SpectraAverage {
     /// Adds one hit: its windowed force, N, and its windowed responses, SI.
     ///
     /// # Errors
-    /// When the number of samples or responses differs from the others, or a value is not a number.
+    /// When the number of samples or responses differs from that of the other hits, or a value is
+    /// not finite.
     pub fn add(&mut self, force_n: &[f64], responses: &[Vec<f64>]) -> Result<(), SpectraError> {
         if responses.len() != self.outputs.len() {
             return Err(SpectraError::Responses { found: responses.len(), expected: self.outputs.len() });
@@ -150,17 +154,17 @@ impl SpectraAverage {
             if signal.len() != self.samples {
                 return Err(SpectraError::Samples { found: signal.len(), expected: self.samples });
             }
-            // before anything is summed: a refused hit leaves the average as it was
+            // checked before anything is summed: a refused hit leaves the average unchanged
             check_finite(signal)?;
         }
         self.add_with(|out| out.copy_from_slice(force_n), |o| Windowed::plain(&responses[o]))
     }
 
-    /// Adds one hit: its windowed force, which is written into memory that holds other values before, and its windowed responses, by
-    /// output. See [`SpectraAverage::add_hits`].
+    /// Adds one hit: its windowed force, which `force` writes into a buffer that holds old values,
+    /// and its windowed responses, by output. See [`SpectraAverage::add_hits`].
     ///
     /// # Errors
-    /// As of `add_hits`.
+    /// As for `add_hits`.
     pub fn add_with<'a>(
         &mut self,
         force: impl Fn(&mut [f64]) + Sync,
@@ -169,11 +173,13 @@ impl SpectraAverage {
         self.add_hits(1, &|_, out| force(out), &|_, o| response(o))
     }
 
-    /// Adds `hits` hits, which keeps every core busy. What a response is shorter than the transform becomes 0.
+    /// Adds `hits` hits in parallel on all cores. Responses shorter than the transform are padded
+    /// with zeros.
     ///
     /// # Errors
-    /// A value that is not a number. Some responses of the hits may be in the sums then, so that the average is spent: this
-    /// and [`SpectraAverage::finish`] give the same error from then on.
+    /// A value that is not finite. Some responses of the hits may already be in the sums, so the
+    /// average becomes unusable: this function and [`SpectraAverage::finish`] return the same error
+    /// from then on.
     pub fn add_hits(
         &mut self,
         hits: usize,
@@ -200,7 +206,7 @@ impl SpectraAverage {
             let hits = first..hits.min(first + TOGETHER);
             let forces = hits.clone().into_par_iter().map(|hit| self.force_of(&|out| force(hit, out)));
             let forces = forces.collect::<Result<Vec<_>, _>>()?;
-            // one hit by itself comes of a loop over cells, which keeps every core busy
+            // a single hit is added from a loop over cells, which already keeps all cores busy
             let at_least = if hits.len() == 1 { self.outputs.len() } else { 1 };
             let (transform, all, band, keep) = (&*self.transform, &self.all, &self.band, self.keep_hits);
             let outputs = self.outputs.par_iter_mut().enumerate().with_min_len(at_least);
@@ -223,7 +229,7 @@ impl SpectraAverage {
                 }
                 Ok(())
             });
-            // beside the outputs, so that no core waits for the last of them alone
+            // runs in parallel with the outputs, so that no core waits for the last of them
             let share = self.s_ff.len().div_ceil(parallel::threads()).max(1);
             let powers = self.s_ff.par_chunks_mut(share).enumerate();
             let add_powers = || {
@@ -242,7 +248,7 @@ impl SpectraAverage {
         Ok(())
     }
 
-    /// The spectrum of a force, at every line in the transform's order.
+    /// The spectrum of a force, at all lines in the transform's order.
     fn force_of(&self, force: &dyn Fn(&mut [f64])) -> Result<Lent, SpectraError> {
         let mut windowed = Lent::of(self.samples.div_ceil(2));
         let windowed: &mut [f64] = &mut cast_slice_mut(&mut windowed)[..self.samples];
@@ -253,12 +259,14 @@ impl SpectraAverage {
         Ok(own)
     }
 
-    /// The spectra on s = σ + iω, where σ is the damping of the window that the signals went through.
+    /// The spectra on s = σ + iω, where σ is the damping of the window that was applied to the
+    /// signals.
     ///
-    /// A channel measured late by `delay_s[output]` relative to the force is corrected by e^(+sτ). Missing delays are 0.
+    /// A channel that lags the force by `delay_s[output]` is corrected by e^(+sτ). Missing delays
+    /// are 0.
     ///
     /// # Errors
-    /// When no hit was added, or adding one failed half way.
+    /// When no hit was added, or adding one failed partway.
     pub fn finish(&self, sigma_per_s: f64, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
         if let Some(error) = &self.failed {
             return Err(error.clone());
@@ -276,10 +284,10 @@ impl SpectraAverage {
         Ok(spectra.with_jackknife(self.keep_hits.then(|| self.jackknife(sigma_per_s, delay_s))))
     }
 
-    /// The force alone, at every line, whatever lines the responses are summed at.
+    /// The force only, at all lines, independent of the lines at which the responses are summed.
     ///
     /// # Errors
-    /// As of [`SpectraAverage::finish`].
+    /// As for [`SpectraAverage::finish`].
     pub fn force(&self, sigma_per_s: f64) -> Result<CrossSpectra, SpectraError> {
         let frequency_hz = self.all.lines().map(|l| self.frequency_hz(l)).collect();
         CrossSpectra::new(
@@ -292,7 +300,7 @@ impl SpectraAverage {
         )
     }
 
-    /// Variance by leaving out each hit in turn, \[line\]\[output\].
+    /// Jackknife variance, leaving out one hit at a time, \[line\]\[output\].
     fn jackknife(&self, sigma_per_s: f64, delay_s: &[f64]) -> Vec<Vec<f64>> {
         let variance: Vec<Vec<f64>> = (0..self.band.len())
             .into_par_iter()
@@ -300,7 +308,7 @@ impl SpectraAverage {
                 let force: Vec<_> = self.kept_force.iter().map(|f| f[l]).collect();
                 let of_output = |(o, output): (usize, &Output)| {
                     let response: Vec<_> = output.kept.iter().map(|x| x[l]).collect();
-                    // |e^(sτ)|², for the advance that H is multiplied with
+                    // |e^(sτ)|², since H is multiplied by e^(sτ)
                     let gain = (2.0 * sigma_per_s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
                     gain * jackknife::variance_of_part(&force, &response)
                 };

@@ -1,4 +1,5 @@
-//! Auto- and cross-spectra of the hits of one impact position: what H1, H2, Hv, coherence and variance derive from.
+//! Auto- and cross-spectra of the hits of one impact position, from which H1, H2, Hv, coherence and
+//! variance derive.
 
 use super::SpectraError;
 use super::estimators::{self, variance_of_part};
@@ -7,39 +8,42 @@ use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// S_ff, S_xf and S_xx over n hits, on the lines s = σ + i2πf of an exponential window's damping σ.
+/// S_ff, S_xf and S_xx over n hits, on the lines s = σ + i2πf for an exponential window's damping
+/// σ.
 ///
-/// The sums stay as they were added up; every FRF is formed when it is asked for, by (line, output). Where the force has no
-/// energy (0 Hz of a signal without mean), nothing is known: FRFs and coherence are 0 there and the variance is infinite.
+/// The sums are stored unscaled; each FRF is computed on request, by (line, output). Where the
+/// force has no energy (0 Hz of a signal without mean), FRFs and coherence are 0 and the variance
+/// is infinite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CrossSpectra {
     fs_hz: f64,
     frequency_hz: Vec<f64>,
     sigma_per_s: f64,
     hits: usize,
-    /// How often the responses were differentiated since they were measured.
+    /// Number of differentiations of the responses since they were measured.
     order: i32,
     s_ff: Vec<f64>,
     outputs: Vec<OutputSums>,
     jackknife: Option<Vec<Vec<f64>>>,
 }
 
-/// The sums of one response, as it was measured.
+/// The sums of one response in the measured quantity.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OutputSums {
     /// Σ X F* per line.
     pub s_xf: Vec<Complex<f64>>,
     /// Σ |X|² per line.
     pub s_xx: Vec<f64>,
-    /// How late the response is against the force, s: FRFs are corrected by e^(+sτ).
+    /// Delay of the response relative to the force, s: FRFs are corrected by e^(+sτ).
     pub delay_s: f64,
 }
 
 impl CrossSpectra {
-    /// Sums over `hits` hits of products of discrete transforms (plain sums over samples, taken at `fs_hz`).
+    /// Sums over `hits` hits of products of discrete transforms (plain sums over samples, taken at
+    /// `fs_hz`).
     ///
     /// # Errors
-    /// No hit, or an output that has not one value for each line.
+    /// No hit, or an output without exactly one value per line.
     pub fn new(
         fs_hz: f64,
         frequency_hz: Vec<f64>,
@@ -59,7 +63,7 @@ impl CrossSpectra {
         Ok(CrossSpectra { fs_hz, frequency_hz, sigma_per_s, hits, order: 0, s_ff, outputs, jackknife: None })
     }
 
-    /// With the variances of leaving out each hit in turn, \[line\]\[output\].
+    /// Adds jackknife variances, \[line\]\[output\].
     pub(super) fn with_jackknife(self, jackknife: Option<Vec<Vec<f64>>>) -> Self {
         CrossSpectra { jackknife, ..self }
     }
@@ -74,17 +78,17 @@ impl CrossSpectra {
         self.sigma_per_s
     }
 
-    /// Hits summed.
+    /// Number of hits summed.
     pub fn hits(&self) -> usize {
         self.hits
     }
 
-    /// How many lines there are.
+    /// Number of lines.
     pub fn lines(&self) -> usize {
         self.frequency_hz.len()
     }
 
-    /// How many responses there are.
+    /// Number of responses.
     pub fn outputs(&self) -> usize {
         self.outputs.len()
     }
@@ -104,7 +108,8 @@ impl CrossSpectra {
         (0..self.lines()).map(|line| self.force(line)).collect()
     }
 
-    /// Mean cross-spectrum of a response with the force, SI N s²; in step with the force.
+    /// Mean cross-spectrum of a response with the force, SI N s²; corrected for the response's
+    /// delay.
     pub fn cross(&self, line: usize, output: usize) -> Complex<f64> {
         self.corrected(line, output, self.outputs[output].s_xf[line]) / self.scale()
     }
@@ -128,7 +133,8 @@ impl CrossSpectra {
         self.corrected(line, output, h)
     }
 
-    /// γ² = |S_xf|² / (S_ff S_xx); NaN with a single hit, where it is 1 whatever the noise.
+    /// γ² = |S_xf|² / (S_ff S_xx); NaN with a single hit, for which it would be 1 regardless of
+    /// noise.
     pub fn coherence(&self, line: usize, output: usize) -> f64 {
         let sums = &self.outputs[output];
         match (self.hits, self.s_ff[line] * sums.s_xx[line]) {
@@ -138,29 +144,30 @@ impl CrossSpectra {
         }
     }
 
-    /// Variance of the real part of H1, and of its imaginary part: |H1|²(1 − γ²)/(2 n γ²). The complex variance E|δH|² is
-    /// twice that. NaN with a single hit.
+    /// Variance of the real part of H1, which equals that of its imaginary part: |H1|²(1 − γ²)/(2 n
+    /// γ²). The complex variance E|δH|² is twice that. NaN with a single hit.
     pub fn variance(&self, line: usize, output: usize) -> f64 {
         let h = estimators::h1(self.s_ff[line], self.outputs[output].s_xf[line]) * self.advance(line, output);
         let variance = variance_of_part(h, self.coherence(line, output), self.hits);
         if self.order == 0 { variance } else { variance * self.s(line).powi(self.order).norm_sqr() }
     }
 
-    /// The same variance by leaving out each hit in turn, \[line\]\[output\], where it was asked for.
+    /// The same variance by jackknife, leaving out one hit at a time, \[line\]\[output\], if it was
+    /// requested.
     pub fn jackknife(&self) -> Option<Vec<Vec<f64>>> {
         let gain = |line: usize| self.s(line).powi(self.order).norm_sqr();
         let rows = self.jackknife.as_ref()?.iter().enumerate();
         Some(rows.map(|(line, row)| row.iter().map(|v| v * gain(line)).collect()).collect())
     }
 
-    /// What `of` says of every line and output, \[line\]\[output\].
+    /// Values of `of` for every line and output, \[line\]\[output\].
     pub fn rows<T>(&self, of: impl Fn(&Self, usize, usize) -> T) -> Vec<Vec<T>> {
         let row = |line| (0..self.outputs()).map(|output| of(self, line, output)).collect();
         (0..self.lines()).map(row).collect()
     }
 
-    /// Adds the hits of other spectra with the same lines, window and responses. Responses that were late by another time are
-    /// put in step with the force first. Variances by leaving out hits are gone.
+    /// Adds the hits of other spectra with the same lines, window and responses. Responses with a
+    /// different delay are corrected first. Jackknife variances are discarded.
     ///
     /// # Errors
     /// [`SpectraError::Unlike`].
@@ -206,7 +213,7 @@ impl CrossSpectra {
         }
     }
 
-    /// The spectra of these outputs alone.
+    /// The spectra of these outputs only.
     #[must_use]
     pub fn of_outputs(&self, outputs: std::ops::Range<usize>) -> CrossSpectra {
         CrossSpectra {
@@ -221,8 +228,8 @@ impl CrossSpectra {
         }
     }
 
-    /// The same hits seen as another quantity: responses multiplied by s once or twice for each time derivative, or divided. A
-    /// line at s = 0 has no lower derivative: it is left out where one is asked for.
+    /// The same hits in another quantity: responses multiplied by s for each time derivative, or
+    /// divided. A line at s = 0 cannot be divided by s and is omitted in that case.
     #[must_use]
     pub fn converted(&self, from: MotionQuantity, to: MotionQuantity) -> CrossSpectra {
         let order = to.order_of_s() - from.order_of_s();
@@ -233,7 +240,7 @@ impl CrossSpectra {
     /// H1 as FRFs with one input.
     ///
     /// # Errors
-    /// Not one name of its own for each output.
+    /// The names of the outputs are not unique, or their number differs from that of the outputs.
     pub fn to_matrix(
         &self,
         quantity: MotionQuantity,
@@ -251,13 +258,14 @@ impl CrossSpectra {
         )
     }
 
-    /// Sums of products of transforms over this are means of Fourier integrals' products.
+    /// Divisor that turns sums of products of discrete transforms into means of products of Fourier
+    /// integrals.
     fn scale(&self) -> f64 {
-        // Fourier transforms are sum × Δt
+        // a Fourier integral is the sum × Δt
         self.hits as f64 * self.fs_hz * self.fs_hz
     }
 
-    /// e^(+sτ): what puts an output in step with the force.
+    /// e^(+sτ): compensates the delay of an output relative to the force.
     fn advance(&self, line: usize, output: usize) -> Complex<f64> {
         match self.outputs[output].delay_s {
             0.0 => Complex::new(1.0, 0.0),
@@ -265,13 +273,13 @@ impl CrossSpectra {
         }
     }
 
-    /// A value in proportion to the response: in step with the force, differentiated.
+    /// Corrects a value proportional to the response for its delay, and differentiates it.
     fn corrected(&self, line: usize, output: usize, value: Complex<f64>) -> Complex<f64> {
         let value = value * self.advance(line, output);
         if self.order == 0 { value } else { value * self.s(line).powi(self.order) }
     }
 
-    /// The sums of an output that is not late any more.
+    /// The sums of an output with its delay removed.
     fn in_step(&self, output: usize) -> OutputSums {
         let sums = &self.outputs[output];
         let advance = |line| self.advance(line, output);

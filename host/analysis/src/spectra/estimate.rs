@@ -1,4 +1,5 @@
-//! From impact records to spectra: where each hit begins, windows, spectra.
+//! From impact records to spectra: finds the start of each hit, applies windows, and averages
+//! spectra.
 
 use super::SpectraError;
 use super::average::SpectraAverage;
@@ -20,25 +21,28 @@ pub enum Origin {
     At(f64),
 }
 
-/// How records become FRFs.
+/// Settings for converting records to FRFs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrfSettings {
     /// The windows.
     pub windowing: Windowing,
     /// Their origin.
     pub origin: Origin,
-    /// How late each response channel is against the force, s; empty means 0.
+    /// Delay of each response channel relative to the force, s; empty means 0.
     pub delay_s: Vec<f64>,
-    /// Length of the transform, samples: longer than the records pads them with zeros (after the windows). None is the records' length.
+    /// Length of the transform, samples. If it exceeds that of the records, they are zero-padded
+    /// after windowing. `None` is the records' length.
     #[serde(default)]
     pub transform_samples: Option<usize>,
-    /// The lines that are wanted, Hz, ends included; None is all of them.
+    /// The lines to compute, Hz, ends included; `None` for all of them.
     #[serde(default)]
     pub band_hz: Option<[f64; 2]>,
-    /// Whether the variance by jackknife is wanted too; the spectra of all hits are kept for it.
+    /// Whether to compute the jackknife variance as well, which requires keeping the spectra of all
+    /// hits.
     #[serde(default)]
     pub jackknife: bool,
-    /// Ratio of noise powers for Hv, response over force, (SI/N)²; None is noise in proportion to the signals.
+    /// Ratio of noise powers for Hv, response over force, (SI/N)²; `None` for noise in proportion
+    /// to the signals.
     #[serde(default)]
     pub noise_ratio: Option<f64>,
 }
@@ -57,7 +61,8 @@ impl Default for FrfSettings {
     }
 }
 
-/// Hits of one rate and length that come one at a time: each is windowed and summed, and needs not be kept.
+/// Average of hits of one rate and length that arrive one at a time: each is windowed and summed,
+/// and need not be kept.
 pub struct Summing {
     fs_hz: f64,
     windowing: Windowing,
@@ -68,18 +73,20 @@ pub struct Summing {
 }
 
 impl Summing {
-    /// For records of `samples` samples and `outputs` responses, which are summed at the lines of `band_hz` (ends included) alone.
+    /// For records of `samples` samples and `outputs` responses, which are summed only at the lines
+    /// of `band_hz` (ends included).
     pub fn new(fs_hz: f64, samples: usize, outputs: usize, windowing: Windowing, band_hz: [f64; 2]) -> Self {
         let average = SpectraAverage::of_band(fs_hz, samples, outputs, band_hz);
         let decay = windowing.kept_decay(fs_hz, samples);
         Summing { fs_hz, windowing, decay, average, samples, outputs }
     }
 
-    /// Adds a hit: its force, N, and its responses, SI, as they were recorded, with the pulse of its force, whose
-    /// start is the origin of the windows.
+    /// Adds a hit: its force, N, and its responses, SI, as recorded, and the pulse of its force,
+    /// whose start is the origin of the windows.
     ///
     /// # Errors
-    /// Another length or number of responses than the others', or a value that is not a number.
+    /// A length or number of responses that differs from that of the other hits, or a value that is
+    /// not finite.
     pub fn add(&mut self, force_n: &[f64], responses: &[&[f64]], pulse: &Pulse) -> Result<(), SpectraError> {
         if responses.len() != self.outputs {
             return Err(SpectraError::Responses { found: responses.len(), expected: self.outputs });
@@ -97,24 +104,24 @@ impl Summing {
         )
     }
 
-    /// The spectra so far; a response is late by `delay_s[output]`.
+    /// The spectra so far, corrected for the delay `delay_s[output]` of each response.
     ///
     /// # Errors
-    /// As of [`SpectraAverage::finish`].
+    /// As for [`SpectraAverage::finish`].
     pub fn finish(&self, delay_s: &[f64]) -> Result<CrossSpectra, SpectraError> {
         self.average.finish(self.windowing.sigma_per_s, delay_s)
     }
 
-    /// The force alone, at every line.
+    /// The force only, at all lines.
     ///
     /// # Errors
-    /// As of [`SpectraAverage::finish`].
+    /// As for [`SpectraAverage::finish`].
     pub fn force(&self) -> Result<CrossSpectra, SpectraError> {
         self.average.force(self.windowing.sigma_per_s)
     }
 }
 
-/// A hit that is used.
+/// A hit that is included in the average.
 struct Hit<'r> {
     force: &'r [f64],
     responses: &'r [Vec<f64>],
@@ -123,10 +130,11 @@ struct Hit<'r> {
     weighting: ResponseWeighting<'r>,
 }
 
-/// Auto- and cross-spectra over those hits of `records` for which `used` is true.
+/// Auto- and cross-spectra over the hits of `records` for which `used` is true.
 ///
 /// # Errors
-/// When no hit is used, hits differ in length or channels, or a used hit has no pulse or values that are not numbers.
+/// When no hit is used, hits differ in length or channels, or a used hit has no pulse or contains
+/// values that are not finite.
 pub fn estimate(
     records: &ImpactRecords,
     used: &[bool],
@@ -135,7 +143,7 @@ pub fn estimate(
     summed(records, used, settings)?.finish(settings.windowing.sigma_per_s, &settings.delay_s)
 }
 
-/// The sums that [`estimate`] makes its spectra of.
+/// The sums from which [`estimate`] computes its spectra.
 pub(super) fn summed(
     records: &ImpactRecords,
     used: &[bool],

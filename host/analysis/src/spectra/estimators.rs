@@ -1,6 +1,7 @@
-//! H1, H2 and Hv of one line from S_ff (real), S_xf = Σ X F* and S_xx (real), all sums over the same hits.
+//! H1, H2 and Hv of one line from S_ff (real), S_xf = Σ X F* and S_xx (real), all sums over the
+//! same hits.
 //!
-//! Where the force or the cross-spectrum is zero there is no FRF to tell, and the estimate is 0 (the coherence says so).
+//! Where the force or the cross-spectrum is zero, the estimate is 0 (and so is the coherence).
 
 use num_complex::Complex;
 
@@ -14,11 +15,12 @@ pub fn h2(s_xf: Complex<f64>, s_xx: f64) -> Complex<f64> {
     if s_xf.norm_sqr() == 0.0 { Complex::default() } else { s_xx / s_xf.conj() }
 }
 
-/// Total least squares for noise in both, where κ = `noise_ratio` is the response's noise power over the force's, (SI/N)²:
-/// (S_xx − κ S_ff + √((S_xx − κ S_ff)² + 4 κ |S_xf|²)) / (2 S_fx).
+/// Total least squares for noise in both, where κ = `noise_ratio` is the response's noise power
+/// over the force's, (SI/N)²: (S_xx − κ S_ff + √((S_xx − κ S_ff)² + 4 κ |S_xf|²)) / (2 S_fx).
 ///
-/// None takes κ = S_xx / S_ff on each line, noise in proportion to the signals, which gives the phase of the cross-spectrum with the
-/// geometric mean of |H1| and |H2| and does not depend on units. κ → ∞ is H1, κ → 0 is H2.
+/// `None` uses κ = S_xx / S_ff on each line, i.e. noise in proportion to the signals. This gives
+/// the phase of the cross-spectrum with the geometric mean of |H1| and |H2|, and does not depend on
+/// units. κ → ∞ is H1, κ → 0 is H2.
 pub fn hv(s_ff: f64, s_xf: Complex<f64>, s_xx: f64, noise_ratio: Option<f64>) -> Complex<f64> {
     let cross = s_xf.norm_sqr();
     if cross == 0.0 || s_ff == 0.0 {
@@ -27,12 +29,13 @@ pub fn hv(s_ff: f64, s_xf: Complex<f64>, s_xx: f64, noise_ratio: Option<f64>) ->
     let Some(kappa) = noise_ratio else { return s_xf / cross.sqrt() * (s_xx / s_ff).sqrt() };
     let difference = s_xx - kappa * s_ff;
     let root = difference.hypot(2.0 * kappa.sqrt() * cross.sqrt());
-    // for a negative difference the sum would cancel: it is multiplied out instead
+    // for a negative difference the sum would suffer from cancellation: use the equivalent quotient
     let sum = if difference >= 0.0 { difference + root } else { 4.0 * kappa * cross / (root - difference) };
     sum / (2.0 * s_xf.conj())
 }
 
-/// |H|²(1 − γ²)/(2 n γ²): variance of the real, and of the imaginary part of H1 (Bendat and Piersol). Infinite at γ² = 0.
+/// |H|²(1 − γ²)/(2 n γ²): variance of the real part of H1, and of its imaginary part (Bendat and
+/// Piersol). Infinite at γ² = 0.
 pub fn variance_of_part(h1: Complex<f64>, coherence: f64, hits: usize) -> f64 {
     if coherence == 0.0 {
         return f64::INFINITY;
@@ -59,7 +62,7 @@ mod tests {
                 prop_assert!(v.norm() <= h2(s_xf, s_xx).norm() * (1.0 + 1e-9));
                 prop_assert!((v / s_xf).im.abs() <= 1e-9 * (v / s_xf).norm());
             }
-            // noise in proportion to the signals is one value of the ratio
+            // noise in proportion to the signals corresponds to one value of the ratio
             let same = hv(s_ff, s_xf, s_xx, Some(s_xx / s_ff));
             prop_assert!((same - hv(s_ff, s_xf, s_xx, None)).norm() <= 1e-9 * same.norm());
         }

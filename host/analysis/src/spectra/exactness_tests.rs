@@ -1,4 +1,4 @@
-//! Known system in, the same system out: FRFs of a synthetic oscillator on s = σ + iω.
+//! A known system must be recovered exactly: FRFs of a synthetic oscillator on s = σ + iω.
 
 use super::*;
 use num_complex::Complex;
@@ -7,7 +7,8 @@ use std::f64::consts::{PI, TAU};
 const FS: f64 = 4096.0;
 const N: usize = 4096;
 
-/// Force: half sine of `width` samples from `start`; response: the force convolved with a decaying sine.
+/// Force: half sine of `width` samples from `start`; response: the force convolved with a decaying
+/// sine.
 fn record(start: usize, width: usize, delay: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let force: Vec<f64> = (0..N)
         .map(|i| {
@@ -88,7 +89,7 @@ fn a_single_hit_has_no_coherence_and_no_variance() {
     assert_eq!(estimate(&records, &[false], &FrfSettings::default()), Err(SpectraError::NoHits));
 }
 
-/// The variance formula against the scatter of many simulated averages.
+/// The variance formula compared with the scatter of many simulated averages.
 #[test]
 fn the_variance_formula_predicts_the_scatter() {
     use proptest::test_runner::{RngAlgorithm, TestRng};
@@ -113,7 +114,7 @@ fn the_variance_formula_predicts_the_scatter() {
     }
     let mean = parts.iter().sum::<f64>() / parts.len() as f64;
     let seen = parts.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / parts.len() as f64;
-    // a variance from 150 trials is known to 12 %; three times that
+    // a variance from 150 trials is known to 12 %; the limit is three times that
     assert!((seen / predicted - 1.0).abs() < 0.36, "seen {seen:e}, predicted {predicted:e}");
     assert!((seen / left_out - 1.0).abs() < 0.36, "seen {seen:e}, jackknife {left_out:e}");
 }
@@ -128,7 +129,7 @@ fn a_band_is_a_part_of_the_whole_and_the_force_stays_whole() {
             let settings = FrfSettings { band_hz: Some([low_hz, high_hz]), ..whole.clone() };
             let sums = estimate::summed(&records, &[true], &settings).expect("one hit");
             let part = sums.finish(2.3, &settings.delay_s).expect("one hit");
-            // NaN of a single hit's variance equals nothing
+            // compare as text, because the NaN variance of a single hit is not equal to itself
             assert_eq!(format!("{part:?}"), format!("{:?}", all.band(low_hz, high_hz)));
             let force = sums.force(2.3).expect("one hit");
             assert_eq!(force.force_spectrum(), all.force_spectrum());
@@ -146,7 +147,8 @@ fn zero_padding_adds_lines_and_moves_none() {
     let y = estimate(&records, &[true], &settings).expect("one hit");
     let unpadded = estimate(&records, &[true], &plain).expect("one hit");
     assert!((y.h1(4 * 180, 0) - unpadded.h1(180, 0)).norm() < 1e-12 * y.h1(4 * 180, 0).norm());
-    // a line between the others is exact too: the response has died away before the record ends
+    // a line between the others is exact too, because the response has decayed before the record
+    // ends
     let s = Complex::new(2.3, TAU * y.frequency_hz()[721]);
     assert!(((y.h1(721, 0) - exact(&h, s)) / exact(&h, s)).norm() < 1e-10);
     settings.transform_samples = Some(N - 1);
@@ -181,7 +183,8 @@ fn a_hit_that_is_not_a_number_leaves_the_average_as_it_was() {
     let error = average.add(&[1.0, 5.0, 0.0, 0.0], &[vec![1.0, 2.0, f64::NAN, 0.0]]);
     assert_eq!(error, Err(SpectraError::NotFinite { sample: 2 }));
     assert_eq!(average.finish(0.0, &[]).expect("a hit").rows(CrossSpectra::h1), before);
-    // written straight into the transforms the hit is half in, so that the average says so for ever
+    // written directly into the transforms, so the hit is partly included and the average keeps
+    // returning the error
     let response = [f64::INFINITY; 4];
     let error = average.add_with(|f| f.fill(1.0), |_| windowed::Windowed::plain(&response));
     assert_eq!(error, Err(SpectraError::NotFinite { sample: 0 }));
@@ -194,7 +197,7 @@ mod rand_like {
     pub(super) struct Gauss<R>(pub(super) R);
     impl<R: Rng> Gauss<R> {
         pub(super) fn next(&mut self) -> f64 {
-            // twelve uniform deviates, variance one
+            // the sum of twelve uniform deviates has variance one
             (0..12).map(|_| self.0.next_u32() as f64 / u32::MAX as f64).sum::<f64>() - 6.0
         }
     }

@@ -1,7 +1,9 @@
-//! The transform of a real record, by a complex one of half its length: even samples are the real parts, odd ones the imaginary.
+//! The transform of a real record, computed by a complex one of half its length: even samples are
+//! the real parts, odd ones the imaginary parts.
 //!
-//! The lines are taken apart only where they are read, which spares a way through memory: Z being the transform of half the length
-//! M = N/2, X(k) = ½ (Z(k) + Z*(M−k)) − ½ i e^(−i2πk/N) (Z(k) − Z*(M−k)).
+//! The lines are separated only where they are read, which saves a pass through memory. With Z the
+//! transform of half the length M = N/2, X(k) = ½ (Z(k) + Z*(M−k)) − ½ i e^(−i2πk/N) (Z(k) −
+//! Z*(M−k)).
 
 use super::lines::Lines;
 use num_complex::Complex;
@@ -15,9 +17,9 @@ type C = Complex<f64>;
 /// A plan for records of one length.
 pub(super) struct HalfLength {
     samples: usize,
-    /// Of the points that [`HalfLength::pack`] makes.
+    /// Transform of the points that [`HalfLength::pack`] makes.
     pub(super) fft: Arc<dyn Fft<f64>>,
-    /// ½ e^(−i2πk/N) of lines k; none of a record whose length is odd, which is transformed whole.
+    /// ½ e^(−i2πk/N) of lines k; empty for a record of odd length, which is transformed as a whole.
     twiddles: Vec<C>,
 }
 
@@ -27,17 +29,17 @@ impl HalfLength {
     pub(super) fn of(samples: usize) -> HalfLength {
         let even = samples.is_multiple_of(2);
         let points = if even { samples / 2 } else { samples };
-        // a planner is whole even if a thread that used it panicked
+        // the planner is valid even after a poisoned lock
         let fft = PLANNER.lock().unwrap_or_else(PoisonError::into_inner).plan_fft_forward(points);
         let twiddle = |k: usize| C::cis(-2.0 * PI * k as f64 / samples as f64) * 0.5;
         let twiddles = if even { (0..points).map(twiddle).collect() } else { Vec::new() };
         HalfLength { samples, fft, twiddles }
     }
 
-    /// Makes points of the samples that lie at their begin: two samples of each, or one.
+    /// Converts the samples at the start of the buffer to points: two samples per point, or one.
     pub(super) fn pack(&self, points: &mut [C]) {
         if self.fft.len() == self.samples {
-            // from the last on, whose places hold no sample that is still to come
+            // backwards, so that no sample is overwritten before it is read
             for i in (0..self.samples).rev() {
                 let samples: &[f64] = bytemuck::cast_slice(points);
                 points[i] = C::from(samples[i]);
@@ -45,7 +47,7 @@ impl HalfLength {
         }
     }
 
-    /// Gives these lines of the transformed points to `to`, as those of its first stretch.
+    /// Passes these lines of the transformed points to `to`, as those of its first stretch.
     pub(super) fn read(&self, spectrum: &[C], within: Range<usize>, to: &mut impl Lines) {
         let points = spectrum.len();
         let part = |from: usize, until: usize| {

@@ -1,4 +1,4 @@
-//! Impact records: what the hammer and the sensors gave, before any processing.
+//! Impact records: the raw signals of the hammer and the sensors, before any processing.
 
 use crate::frf::MotionQuantity;
 
@@ -11,6 +11,6 @@ pub struct ImpactRecords {
     pub force_n: Vec<Vec<f64>>,
     /// Responses \[hit\]\[channel\]\[sample\], SI.
     pub response: Vec<Vec<Vec<f64>>>,
-    /// What the responses are.
+    /// Quantity of the responses.
     pub quantity: MotionQuantity,
 }

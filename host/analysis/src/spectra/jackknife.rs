@@ -1,11 +1,13 @@
-//! The variance of H1 from the hits themselves: each is left out in turn.
+//! The variance of H1 from the hits themselves, by leaving out one hit at a time.
 //!
-//! The coherence formula assumes that all hits share one force spectrum's shape and differ by noise only; the jackknife also sees
-//! what differs from hit to hit for other reasons (aim, a loosening joint).
+//! The coherence formula assumes that the force spectra of all hits have the same shape and that
+//! the hits differ by noise only; the jackknife also includes other variations between hits (aim, a
+//! loosening joint).
 
 use num_complex::Complex;
 
-/// Variance of the real part of H1, and of its imaginary part, at one line: half of (n − 1)/n Σ |H₍₋ᵢ₎ − H̄|². NaN below two hits.
+/// Variance of the real part of H1, which equals that of its imaginary part, at one line: half of
+/// (n − 1)/n Σ |H₍₋ᵢ₎ − H̄|². NaN below two hits.
 pub fn variance_of_part(force: &[Complex<f64>], response: &[Complex<f64>]) -> f64 {
     let n = force.len().min(response.len());
     if n < 2 {
@@ -32,7 +34,8 @@ mod tests {
         let force = vec![Complex::new(2.0, 0.0); 4];
         let h = [1.0, 2.0, 4.0, 9.0];
         let response: Vec<_> = h.iter().map(|h| Complex::new(2.0 * h, 0.0)).collect();
-        // mean 4, squares 9 + 4 + 0 + 25 = 38; variance of the mean 38 / (3 · 4), half of it for each part
+        // mean 4, squares 9 + 4 + 0 + 25 = 38; variance of the mean 38 / (3 · 4), half of it for
+        // each part
         assert!((variance_of_part(&force, &response) - 38.0 / 24.0).abs() < 1e-12);
         assert!(variance_of_part(&force[..1], &response[..1]).is_nan());
     }

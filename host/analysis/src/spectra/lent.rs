@@ -1,4 +1,5 @@
-//! Memory of transforms, lent again and again: fresh memory costs as much as a transform's first pass over it.
+//! FFT scratch buffers, reused because fresh memory costs as much as a transform's first pass over
+//! it.
 
 use num_complex::Complex;
 use std::ops::{Deref, DerefMut};
@@ -6,19 +7,19 @@ use std::sync::{Mutex, PoisonError};
 
 type C = Complex<f64>;
 
-/// What nobody uses, the last given back at the end.
+/// Idle buffers, the most recently returned last.
 static IDLE: Mutex<Vec<Vec<C>>> = Mutex::new(Vec::new());
 
-/// Idle numbers kept at most: 32 MB.
+/// Largest total size of idle buffers, complex numbers: 32 MB.
 const KEPT_AT_MOST: usize = 1 << 21;
 
-/// Memory that is given back when it is no longer used. It holds other values before.
+/// A buffer that returns to the pool when dropped. Its initial contents are arbitrary.
 pub(super) struct Lent(Vec<C>);
 
 impl Lent {
-    /// So many numbers.
+    /// A buffer of `count` numbers.
     pub(super) fn of(count: usize) -> Lent {
-        // the list is whole even if a thread that used it panicked
+        // the list is valid even after a poisoned lock
         let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
         let place = idle.iter().rposition(|piece| piece.len() == count);
         let piece = place.map(|place| idle.remove(place));
@@ -26,7 +27,7 @@ impl Lent {
         Lent(piece.unwrap_or_else(|| vec![C::default(); count]))
     }
 
-    /// So many zeros.
+    /// A buffer of `count` zeros.
     pub(super) fn zeros(count: usize) -> Lent {
         let mut own = Lent::of(count);
         own.fill(C::default());
@@ -42,7 +43,7 @@ impl Drop for Lent {
         }
         let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
         idle.push(own);
-        // the oldest first: their length may not come again
+        // drop the oldest first: their length may not be needed again
         while idle.iter().map(Vec::len).sum::<usize>() > KEPT_AT_MOST {
             idle.remove(0);
         }

@@ -1,4 +1,4 @@
-//! Where a transform's lines go.
+//! Destinations for the lines of a transform.
 
 use super::order::Order;
 use crate::vectors::wide;
@@ -7,13 +7,14 @@ use std::ops::Range;
 
 type C = Complex<f64>;
 
-/// What lines are for.
+/// Receives the lines of a transform.
 pub(super) trait Lines {
-    /// Takes lines of a stretch, by their number in its piece: one value for each, in a loop compiled for the processor at hand.
+    /// Takes lines of a stretch, by their index in its piece, with one value each; called in a loop
+    /// compiled for the processor in use.
     fn take(&mut self, stretch: usize, within: Range<usize>, values: impl Iterator<Item = C>);
 }
 
-/// Lines that are written in their order.
+/// Writes lines in their order.
 pub(super) struct Put<'a> {
     pub(super) order: &'a Order,
     pub(super) out: &'a mut [C],

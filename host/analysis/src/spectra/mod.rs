@@ -1,9 +1,12 @@
-//! Spectra: impact records in, FRFs with coherence and variance out.
+//! Spectra: from impact records to FRFs with coherence and variance.
 //!
-//! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and S_xx one hit at a time,
-//! [`cross_spectra`] keeps them and gives FRFs with their scatter by [`estimators`] and [`jackknife`], [`estimate`](mod@estimate) does all of it over a set of
-//! records, [`odd_hit`](mod@odd_hit) names a hit that disagrees with the others, [`usable_band`](mod@usable_band) says where the hammer excited anything. Which hits are good is
-//! decided elsewhere, on the raw records: the force window hides a second pulse that the response keeps.
+//! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and
+//! S_xx one hit at a time, [`cross_spectra`] stores them and gives FRFs with their scatter by
+//! [`estimators`] and [`jackknife`]. [`estimate`](mod@estimate) performs all of this for a set of
+//! records, [`odd_hit`](mod@odd_hit) identifies a hit that disagrees with the others, and
+//! [`usable_band`](mod@usable_band) finds the band that the hammer excited. Whether a hit is good
+//! is decided elsewhere, from the raw records: the force window hides a second pulse that the
+//! response retains.
 
 pub mod average;
 pub mod cross_spectra;
@@ -33,14 +36,14 @@ pub use pulse::{Pulse, reversed_peak_n, several_hits_s};
 pub use usable_band::usable_band;
 pub use window::{ForceWeighting, PulseSamples, Windowing};
 
-/// Why records cannot become FRFs.
+/// Reasons why records cannot be converted to FRFs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpectraError {
     /// No hit to average.
     #[error("no hit to average: every one was refused, or there is none")]
     NoHits,
-    /// A hit has another length than the first.
+    /// A hit differs in length from the first.
     #[error("a record has {found} samples, the others {expected}: average only records of one length")]
     Samples {
         /// Samples found.
@@ -48,7 +51,7 @@ pub enum SpectraError {
         /// Samples expected.
         expected: usize,
     },
-    /// A hit has another number of responses.
+    /// A hit has a different number of responses.
     #[error("a hit has {found} responses, the others {expected}")]
     Responses {
         /// Responses found.
@@ -59,7 +62,7 @@ pub enum SpectraError {
     /// A value is NaN or infinite.
     #[error("sample {sample} is not a number: refuse the hit")]
     NotFinite {
-        /// The first such sample.
+        /// Index of the first such sample.
         sample: usize,
     },
     /// A hit has no pulse.
@@ -73,15 +76,15 @@ pub enum SpectraError {
         "a transform of {transform} samples is shorter than the records of {samples}: zero padding makes it longer"
     )]
     Padding {
-        /// Length asked for.
+        /// Requested length.
         transform: usize,
         /// Length of the records.
         samples: usize,
     },
-    /// Spectra that cannot be added or put together.
+    /// Spectra that do not match and cannot be added or combined.
     #[error("the spectra have other lines, another window or other responses: they do not belong together")]
     Unlike,
-    /// The transform failed (a length it cannot do).
+    /// The transform failed (unsupported length).
     #[error("Fourier transform: {0}")]
     Transform(String),
 }

@@ -1,45 +1,49 @@
-//! Which hit differs from all others, and what would make it fit: channels in another order, a sign, a scale.
+//! Finds a hit that differs from all others, and the change that would make it match: channels in
+//! another order, a sign, a scale.
 //!
-//! Each record may be faultless and the hits still disagree: a sensor was turned between two hits, cables were swapped, a
-//! gain was changed. The FRF of each hit is compared with the mean of the others' FRFs, channel by channel.
+//! Each record may be valid and the hits still disagree: a sensor was turned between two hits,
+//! cables were swapped, a gain was changed. The FRF of each hit is compared with the mean of the
+//! others' FRFs, channel by channel.
 
 use super::cross_spectra::CrossSpectra;
 use num_complex::Complex;
 
-/// A hit differs when one of its channels is this far from the others' mean, relative to the larger of both.
+/// A hit differs if one of its channels deviates from the others' mean by this fraction of the
+/// larger of both
 const DIFFERENT: f64 = 0.3;
 
-/// ... and this many times as far as the others scatter.
+/// and by this many times the others' scatter.
 const BEYOND_SCATTER: f64 = 5.0;
 
-/// A channel fits within this part, or within three times the others' scatter.
+/// A channel matches within this fraction, or within three times the others' scatter.
 const FITS: f64 = 0.15;
 
-/// All orders of so many channels are tried.
+/// Up to this many channels, all orders are tried.
 const MOST_CHANNELS: usize = 4;
 
-/// One hit that is not like the others.
+/// A hit that differs from the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OddHit {
-    /// Its index in what was given.
+    /// Its index in the input.
     pub hit: usize,
-    /// Largest difference of one of its channels from the others' mean, relative.
+    /// Largest relative difference of one of its channels from the others' mean.
     pub difference: f64,
-    /// What it would fit with, if anything was found.
+    /// The change that makes it match, if any was found.
     pub fit: Option<Fit>,
 }
 
-/// How a hit fits the others.
+/// Change that makes a hit match the others.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fit {
-    /// Its channels in order are these channels of the others; true where the sign is the other one.
+    /// Its channels, in order, are these channels of the others; `true` if the sign is inverted.
     Channels(Vec<(usize, bool)>),
-    /// All its channels are this many times the others'.
+    /// All its channels are the others' times this factor.
     Scaled(f64),
 }
 
-/// The hit that differs from the others, by the spectra of each hit alone over the same lines. Of two hits, which both differ from
-/// the other, the second is named, and only where something makes it fit.
+/// The hit that differs from the others, from the spectra of each hit over the same lines. With
+/// only two hits, each differs from the other; the second one is returned, and only if some change
+/// makes it match.
 pub fn odd_hit(hits: &[CrossSpectra]) -> Option<OddHit> {
     let first = hits.first()?;
     let (lines, outputs) = (first.lines(), first.outputs());
@@ -72,18 +76,18 @@ fn norm(x: &[Complex<f64>]) -> f64 {
     x.iter().map(Complex::norm_sqr).sum::<f64>().sqrt()
 }
 
-/// |a − factor b| relative to the larger of both; 0 of two that are nothing.
+/// |a − factor b| relative to the larger of both; 0 if both are zero.
 fn apart(a: &[Complex<f64>], b: &[Complex<f64>], factor: f64) -> f64 {
     let rest: f64 = a.iter().zip(b).map(|(a, b)| (a - b * factor).norm_sqr()).sum();
     let larger = norm(a).max(factor.abs() * norm(b));
     if larger > 0.0 { rest.sqrt() / larger } else { 0.0 }
 }
 
-/// All hits but one.
+/// All hits except one.
 struct Others {
     /// Mean of each channel.
     mean: Vec<Signal>,
-    /// How far one of them is from the mean, relative; of each channel.
+    /// Largest relative deviation of one of them from the mean, for each channel.
     scatter: Vec<f64>,
 }
 
@@ -110,7 +114,8 @@ impl Others {
         hit.iter().zip(&self.mean).map(|(a, b)| apart(a, b, 1.0)).fold(0.0, f64::max)
     }
 
-    /// How many times as far as the others' scatter the hit is away; none where that is within what hits may differ by.
+    /// Deviation of the hit relative to the others' scatter; `None` if it is within the tolerance
+    /// for differences between hits.
     fn beyond(&self, hit: &[Signal]) -> Option<f64> {
         let ratios = hit.iter().zip(&self.mean).zip(&self.scatter).filter_map(|((a, b), scatter)| {
             let away = apart(a, b, 1.0);
@@ -127,7 +132,8 @@ impl Others {
         rest < FITS.max(3.0 * self.scatter[channel])
     }
 
-    /// The order and signs with the least misfit, if every channel fits then; of equals, the one that changes least.
+    /// The order and signs with the smallest misfit, if every channel then matches; among equals,
+    /// the one that changes least.
     fn channels(&self, hit: &[Signal]) -> Option<Vec<(usize, bool)>> {
         let outputs = hit.len();
         if outputs > MOST_CHANNELS {
@@ -168,7 +174,7 @@ impl Others {
     }
 }
 
-/// Every order of the numbers below `count`.
+/// All permutations of the numbers below `count`.
 fn orders(count: usize) -> Vec<Vec<usize>> {
     let mut all = vec![Vec::new()];
     for _ in 0..count {
@@ -191,7 +197,8 @@ mod tests {
 
     const FS: f64 = 4096.0;
 
-    /// Spectra of hits on a ringing structure; `parts` of hit and channel say what of which mode it sees.
+    /// Spectra of hits on a ringing structure; `parts` gives the amplitude of each mode, by hit and
+    /// channel.
     fn spectra(parts: &[Vec<[f64; 2]>]) -> Vec<CrossSpectra> {
         let force = |i: u32| {
             let t = (f64::from(i) - 40.0) / 8.0;
@@ -243,7 +250,7 @@ mod tests {
             let odd = odd_hit(&all).expect("one differs");
             let wanted: Vec<(usize, bool)> = order.into_iter().zip(signs.map(|s| s < 0.0)).collect();
             assert_eq!((odd.hit, odd.fit), (1, Some(Fit::Channels(wanted))));
-            // of two hits, the second fits the first
+            // of two hits, the second matches the first after a change
             assert!(odd_hit(&all[..2]).is_some_and(|odd| odd.hit == 1 && odd.fit.is_some()));
         }
     }
@@ -257,7 +264,7 @@ mod tests {
         let strange = vec![[0.2, 2.0], [0.7, 0.7], [1.0, -3.0]];
         let odd = odd_hit(&spectra(&[strange.clone(), good(), good()])).expect("one differs");
         assert_eq!((odd.hit, odd.fit), (0, None));
-        // of two that are unlike, none is the odd one
+        // of two hits that differ, neither can be identified as the odd one
         assert_eq!(odd_hit(&spectra(&[strange, good()])), None);
     }
 

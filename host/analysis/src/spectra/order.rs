@@ -1,10 +1,10 @@
-//! The order in which a transform leaves its lines: stretch by stretch, of which each is of one piece, whose lines are alike modulo
-//! their number.
+//! The order in which a transform leaves its lines: in stretches, each from one piece, in which
+//! line numbers advance by a constant step.
 
 use super::pieces::{PARTS, PIECES};
 use std::ops::Range;
 
-/// The lines of a transform in the order in which it leaves them.
+/// The lines of a transform in the order in which they are computed.
 #[derive(Clone)]
 pub(super) struct Order {
     samples: usize,
@@ -12,21 +12,21 @@ pub(super) struct Order {
     lines: Range<usize>,
 }
 
-/// Lines of one piece that follow each other in it.
+/// Consecutive lines of one piece.
 #[derive(Clone, Copy)]
 pub(super) struct Stretch {
-    /// Which piece.
+    /// Index of the piece.
     pub(super) piece: usize,
-    /// Number k of the piece is line `step` k + piece.
+    /// Element k of the piece is line `step` k + piece.
     step: usize,
-    /// Or as far from the end, N minus that: the piece holds its conjugate.
+    /// If true, it is instead line N − (`step` k + piece): the piece holds its conjugate.
     pub(super) mirrored: bool,
 }
 
-/// Of a transform that is whole.
+/// For a transform computed as a whole.
 const WHOLE: [Stretch; 1] = [Stretch { piece: 0, step: 1, mirrored: false }];
 
-/// Of one in [pieces](super::pieces).
+/// For a transform computed in [pieces](super::pieces).
 const IN_PIECES: [Stretch; 2 * PIECES - 1] = {
     let zero = Stretch { piece: 0, step: PARTS / 2, mirrored: false };
     let mut all = [zero; 2 * PIECES - 1];
@@ -40,7 +40,7 @@ const IN_PIECES: [Stretch; 2 * PIECES - 1] = {
 };
 
 impl Order {
-    /// These lines of so many samples' transform.
+    /// These lines of the transform of `samples` samples.
     pub(super) fn of(samples: usize, in_pieces: bool, lines: Range<usize>) -> Order {
         Order { samples, stretches: if in_pieces { &IN_PIECES } else { &WHOLE }, lines }
     }
@@ -55,17 +55,17 @@ impl Order {
         self.lines.clone()
     }
 
-    /// How many lines there are.
+    /// Number of lines.
     pub(super) fn len(&self) -> usize {
         self.lines.len()
     }
 
-    /// Which of a stretch's lines are among these, by their number in the piece.
+    /// The elements of a stretch's piece that belong to these lines.
     pub(super) fn within(&self, stretch: usize) -> Range<usize> {
         let Stretch { piece, step, mirrored } = self.stretches[stretch];
         let Range { start, end } = self.lines;
         if mirrored {
-            // N − (step k + piece) ≥ line up to this k
+            // largest k for which N − (step k + piece) ≥ line
             let until = |line: usize| (self.samples - piece - line) / step + 1;
             until(end)..until(start)
         } else {
@@ -74,14 +74,15 @@ impl Order {
         }
     }
 
-    /// Where values of these numbers of a stretch are among the values of all lines in this order.
+    /// Positions of these elements of a stretch among the values of all lines in this order.
     pub(super) fn places(&self, stretch: usize, within: &Range<usize>) -> Range<usize> {
         let before: usize = (0..stretch).map(|stretch| self.within(stretch).len()).sum();
         let first = before + within.start - self.within(stretch).start;
         first..first + within.len()
     }
 
-    /// The stretch of a line, and where its value is among the values of all lines in this order.
+    /// The stretch of a line, and the position of its value among the values of all lines in this
+    /// order.
     fn place(&self, line: usize) -> Option<(&Stretch, usize)> {
         self.stretches.iter().enumerate().find_map(|(number, stretch)| {
             let Stretch { piece, step, mirrored } = stretch;
@@ -93,9 +94,9 @@ impl Order {
         })
     }
 
-    /// Values in this order, by rising line.
+    /// Converts values in this order to the order of rising lines.
     pub(super) fn by_line<T: Clone>(&self, values: &[T]) -> Vec<T> {
-        // of lines that are alike modulo PARTS each value is as far from the one before
+        // for lines that are equal modulo PARTS, positions advance by a constant step
         let mut cursors = [(0, 0); PARTS];
         for line in self.lines().take(PARTS) {
             if let Some((stretch, place)) = self.place(line) {
@@ -112,7 +113,7 @@ impl Order {
         self.lines().map(value).collect()
     }
 
-    /// Of values in this order, those of `fewer` lines in the order of these.
+    /// From values in this order, those of `fewer` lines, in the order of `fewer`.
     pub(super) fn only<T: Copy>(&self, fewer: &Order, values: &[T]) -> Vec<T> {
         (0..self.stretches.len())
             .flat_map(|stretch| &values[self.places(stretch, &fewer.within(stretch))])
@@ -132,7 +133,7 @@ mod tests {
         {
             let lines = samples / 2 + 1;
             let all = Order::of(samples, in_pieces, 0..lines);
-            // which line is where
+            // position of each line
             let mut ordered = vec![usize::MAX; lines];
             for line in 0..lines {
                 let (_, place) = all.place(line).expect("a line");

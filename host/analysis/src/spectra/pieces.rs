@@ -1,10 +1,12 @@
-//! One long transform of a real record as eight short ones: a pass over the sixteen parts of the record, after which each piece is by itself.
+//! Computes one long transform of a real record as eight short ones: one pass over the sixteen
+//! parts of the record, after which each piece is independent.
 //!
-//! Of N samples x(n) and q = N/16, piece p is y_p(j) = e^(−i2πpj/N) Σ_r e^(−i2πpr/16) x(j + rq), and its transform holds X(16k + p) at k
-//! (decimation in frequency). Pieces 1 to 7 hold the lines before each sixteenth one too: X(N − l) = X*(l). What is left, every
-//! eighth line, is the transform of a real record of an eighth of the length, Σ_r x(j + 2rq): that is piece 0.
+//! For N samples x(n) and q = N/16, piece p is y_p(j) = e^(−i2πpj/N) Σ_r e^(−i2πpr/16) x(j + rq),
+//! and its transform holds X(16k + p) at k (decimation in frequency). Pieces 1 to 7 also contain
+//! the mirrored lines 16k − p, because X(N − l) = X*(l). The remaining lines, every eighth one,
+//! form the transform of a real record of an eighth of the length, Σ_r x(j + 2rq): this is piece 0.
 //!
-//! A long transform and its factors do not fit into the cache next to a core; a piece does.
+//! A long transform and its factors do not fit into a core's fastest cache; a piece does.
 
 use super::window::RUN;
 use super::windowed::Windowed;
@@ -16,34 +18,35 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 type C = Complex<f64>;
 
-/// Pieces of a transform.
+/// Number of pieces of a transform.
 pub(super) const PIECES: usize = 8;
 
-/// Parts of a record.
+/// Number of parts of a record.
 pub(super) const PARTS: usize = 16;
 
 /// cos π/8 and sin π/8.
 const COS: f64 = 0.923_879_532_511_286_7;
 const SIN: f64 = 0.382_683_432_365_089_8;
 
-/// Samples of each part that are folded together: those of all parts fit into half of a core's first cache.
+/// Samples of each part that are folded together: those of all parts fit into half of a core's
+/// first-level cache.
 const BLOCK: usize = 128;
 const _: () = assert!(BLOCK <= RUN, "weights are known for a run at a time");
 
-/// The factors of one length.
+/// The twiddle factors for one length.
 pub(super) struct Pieces {
-    /// e^(−i2πj/N); the other pieces' factors are products of it.
+    /// e^(−i2πj/N); the factors of the other pieces are products of these.
     factors: Vec<C>,
 }
 
 impl Pieces {
-    /// Of a record of so many samples, a multiple of sixteen.
+    /// For a record of `samples` samples, a multiple of sixteen.
     pub(super) fn of(samples: usize) -> Pieces {
         let angle = |j: usize| -2.0 * PI * j as f64 / samples as f64;
         Pieces { factors: (0..samples / PARTS).map(|j| C::cis(angle(j))).collect() }
     }
 
-    /// Writes the pieces of a record; two samples of piece 0 are one point.
+    /// Writes the pieces of a record; two samples of piece 0 form one point.
     pub(super) fn write(&self, record: Windowed<'_>, pieces: &mut [C]) {
         let q = self.factors.len();
         let (zero, complex) = pieces.split_at_mut(q);
@@ -78,18 +81,18 @@ impl Pieces {
     }
 }
 
-/// A block of every part, and its place in every piece.
+/// One block of every part, and its destination in every piece.
 struct Fold<'a> {
     samples: &'a [f64],
-    /// Where each part's block begins.
+    /// Start of each part's block.
     at: [usize; PARTS],
     places: &'a [f64],
-    /// Each part's weight, times those of the places from one on.
+    /// The weight of each part is this number times the entries of `places` from this index on.
     weights: [(f64, usize); PARTS],
     factors: &'a [C],
     zero: &'a mut [f64],
     zero_later: &'a mut [f64],
-    /// Those of pieces 1 to 7.
+    /// Destinations in pieces 1 to 7.
     complex: [&'a mut [C]; PIECES - 1],
 }
 
@@ -118,7 +121,8 @@ impl NullaryFnOnce for Fold<'_> {
     }
 }
 
-/// The compiler knows of arguments, not of fields, that nothing else is at the same place: without that it adds one number at a time.
+/// These are arguments rather than fields because the compiler assumes only for arguments that they
+/// do not alias; otherwise it adds one number at a time.
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 #[expect(clippy::too_many_arguments, reason = "see above")]
 #[inline(always)]
@@ -145,7 +149,8 @@ fn fold(
     let (p5, p6, p7) = (&mut p5[..count], &mut p6[..count], &mut p7[..count]);
     for j in 0..count {
         let x = |part: usize| x[part][j] * (scale[part] * weight[part][j]);
-        // sums and differences of parts that are half a record apart: even pieces are made of sums, odd ones of differences
+        // sums and differences of parts half a record apart: even pieces are made of sums, odd ones
+        // of differences
         let apart = |part: usize| {
             let (one, other) = (x(part), x(part + PARTS / 2));
             (one + other, one - other)
@@ -165,7 +170,7 @@ fn fold(
         p4[j] = C::new(a0 - a2, a3 - a1) * f4;
         p6[j] = C::new(b0 - less, b2 - more) * (f4 * f2);
 
-        // e^(−iπpr/8) of parts r and 8 − r differ in the sign of the real part alone
+        // e^(−iπpr/8) of parts r and 8 − r differ only in the sign of the real part
         let (u1, u2, u3) = (d1 - d7, FRAC_1_SQRT_2 * (d2 - d6), d3 - d5);
         let (v1, v2, v3) = (d1 + d7, FRAC_1_SQRT_2 * (d2 + d6), d3 + d5);
         let (near, far) = (d0 + u2, d0 - u2);

@@ -1,7 +1,7 @@
-//! Where the hammer's main pulse is in a force record, and how high it really is.
+//! Finds the hammer's main pulse in a force record, and its true height.
 //!
-//! Also what is wrong with a record as a record of one hit: a force of the wrong sign, a record that begins or ends
-//! within the pulse, and several hits in one record.
+//! It also detects faults of a record that should contain one hit: a force of the wrong sign, a
+//! record that begins or ends within the pulse, and several hits in one record.
 
 use crate::median::middle;
 use crate::vectors::{all_finite, largest};
@@ -10,23 +10,25 @@ use std::ops::Range;
 /// Fraction of the peak that bounds the pulse.
 const EDGE: f64 = 0.02;
 
-/// The feet of the pulse are followed down to this fraction of the peak, or to the noise.
+/// The feet of the pulse extend down to this fraction of the peak, or to the noise,
 const FOOT: f64 = 1e-3;
 
-/// ... and no further than this many widths from the edges.
+/// but no further than this many widths from the edges.
 const LONGEST_FOOT: usize = 4;
 
-/// A force that falls this much further below its resting level than it rises above it has the wrong sign. The
-/// undershoot of an AC-coupled cell is a small part of its pulse.
+/// The force has the wrong sign if it falls this many times further below its resting level than it
+/// rises above it. The undershoot of an AC-coupled cell is a small fraction of its pulse.
 const REVERSED: f64 = 2.0;
 
-/// Another pulse counts as a hit of its own from this fraction of the highest on ...
+/// Another pulse counts as a separate hit if it has at least this fraction of the highest one
 const OWN_HIT: f64 = 0.3;
 
-/// ... and this long after the one before, s. A hammer that bounces is back within a tenth of a second.
+/// and occurs this long after the one before, s. A bouncing hammer returns within a tenth of a
+/// second.
 const OWN_HIT_AFTER_S: f64 = 0.25;
 
-/// A block of samples whose rms is one estimate of the noise; the median over the record is robust against pulses.
+/// Samples per block; the rms of each block is one estimate of the noise, and their median over the
+/// record is robust against pulses.
 const NOISE_BLOCK: usize = 64;
 
 /// The main pulse: the highest of the record.
@@ -34,12 +36,12 @@ const NOISE_BLOCK: usize = 64;
 pub struct Pulse {
     /// Sample of the largest value.
     pub peak_sample: usize,
-    /// First sample above 2 % of the peak (or the noise, where that is higher).
+    /// First sample above 2 % of the peak (or above the noise, if that is higher).
     pub start: usize,
     /// First sample after the pulse.
     pub end: usize,
-    /// Peak of the band-limited signal above the offset, N: half-millisecond pulses are some twenty samples, and the
-    /// largest of them may be a per cent below the true peak.
+    /// Peak of the band-limited signal above the offset, N: a half-millisecond pulse has only about
+    /// twenty samples, and the largest of them may be one per cent below the true peak.
     pub peak_n: f64,
     /// Resting level of the record, N.
     pub offset_n: f64,
@@ -48,7 +50,8 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// Finds the pulse; none in an empty or constant record or one with values that are not numbers.
+    /// Finds the pulse; `None` in an empty or constant record or one with values that are not
+    /// finite.
     pub fn locate(force_n: &[f64]) -> Option<Pulse> {
         if !all_finite(force_n) {
             return None;
@@ -69,12 +72,13 @@ impl Pulse {
         Some(Pulse { peak_sample, start, end, peak_n, offset_n, noise_n })
     }
 
-    /// Samples from start to end.
+    /// Number of samples from start to end.
     pub fn width(&self) -> usize {
         self.end - self.start
     }
 
-    /// The samples that hold the whole pulse, its feet included, in the record that it was found in.
+    /// The samples that contain the whole pulse, including its feet, in the record in which it was
+    /// found.
     pub fn whole(&self, force_n: &[f64]) -> Range<usize> {
         let top = force_n[self.peak_sample] - self.offset_n;
         let level = (FOOT * top).max(2.0 * self.noise_n);
@@ -82,16 +86,16 @@ impl Pulse {
         let most = LONGEST_FOOT * self.width();
         let before = (0..self.start).rev().take(most).take_while(foot).count();
         let after = (self.end..force_n.len()).take(most).take_while(foot).count();
-        // what lies below the level: an exponential tail that ends in noise of 1 % of the peak has
-        // 4 % of its impulse there; after one more width, less than a thousandth
+        // the part below the level: an exponential tail that ends in noise of 1 % of the peak has 4
+        // % of its impulse there; after one more width, less than a thousandth
         let (ahead, behind) = (self.width().div_ceil(2) + 2, self.width() + 2);
         let first = self.start.saturating_sub(before + ahead);
         first..(self.end + after + behind).min(force_n.len())
     }
 
-    /// The impulse of the force outside the samples `kept`, as a part of the pulse's impulse: the largest of the means over
-    /// the stretches before and after, which are looked at as far as twice the length of what is kept. 0 where
-    /// it is not above the noise.
+    /// The impulse of the force outside the samples `kept`, as a fraction of the pulse's impulse:
+    /// the larger of the impulses before and after, each within twice the length of `kept`. 0 where
+    /// it does not exceed the noise.
     pub fn impulse_outside(&self, force_n: &[f64], kept: Range<usize>) -> f64 {
         let sum = |range: Range<usize>| -> f64 { force_n[range].iter().map(|f| f - self.offset_n).sum() };
         let reach = 2 * kept.len();
@@ -107,7 +111,8 @@ impl Pulse {
     }
 }
 
-/// Peak of the force, N, below its resting level where its sign is the wrong way round: it falls in the hit.
+/// The negative peak of the force, N, relative to its resting level, if the sign is inverted, i.e.
+/// the force falls during the hit.
 pub fn reversed_peak_n(force_n: &[f64]) -> Option<f64> {
     let turned: Vec<f64> = force_n.iter().map(|f| -f).collect();
     let fall = Pulse::locate(&turned)?;
@@ -115,7 +120,7 @@ pub fn reversed_peak_n(force_n: &[f64]) -> Option<f64> {
     (fall.peak_n > 10.0 * fall.noise_n && fall.peak_n > REVERSED * rise).then_some(-fall.peak_n)
 }
 
-/// Where the hits of a record begin, s, when it holds more than one.
+/// Start times of the hits of a record, s, if it contains more than one.
 pub fn several_hits_s(force_n: &[f64], fs_hz: f64) -> Option<Vec<f64>> {
     let main = Pulse::locate(force_n)?;
     let apart = (OWN_HIT_AFTER_S * fs_hz).ceil() as usize;
@@ -133,7 +138,7 @@ pub fn several_hits_s(force_n: &[f64], fs_hz: f64) -> Option<Vec<f64>> {
 
 /// Root mean square about `offset` of each block.
 fn rms_of_blocks(x: &[f64], offset: f64) -> Vec<f64> {
-    // a sum waits for its own last addition: those of several blocks do not wait for one another
+    // several sums in parallel, since each addition to a single sum waits for the one before
     const TOGETHER: usize = 8;
     let rms = |sum: f64, count: usize| (sum / count as f64).sqrt();
     let mut all = Vec::with_capacity(x.len().div_ceil(NOISE_BLOCK));
@@ -152,7 +157,8 @@ fn rms_of_blocks(x: &[f64], offset: f64) -> Vec<f64> {
     all
 }
 
-/// The largest value within one sample of `peak` of the record interpolated sixteenfold by a windowed sinc.
+/// The largest value within one sample of `peak`, with the record interpolated sixteenfold by a
+/// windowed sinc.
 fn band_limited_peak(x: &[f64], peak: usize) -> f64 {
     const STEPS: i32 = 16;
     const REACH: i32 = 16;
@@ -194,7 +200,8 @@ mod tests {
         #[test]
         fn the_peak_does_not_depend_on_where_the_samples_fall(start in 250.0..251.0f64, width in 15.0..40.0f64) {
             let pulse = Pulse::locate(&half_sine(50.0, start, width, 1000)).expect("a pulse");
-            // a half sine's corners are not band-limited: a few parts in a thousand at fifteen samples
+            // the corners of a half sine are not band-limited: a few parts in a thousand at fifteen
+            // samples
             prop_assert!((pulse.peak_n / 50.0 - 1.0).abs() < 5e-3, "{}", pulse.peak_n);
             prop_assert!((pulse.start as f64 - start).abs() < 2.0 && (pulse.end as f64 - start - width).abs() < 2.0);
         }
@@ -212,7 +219,7 @@ mod tests {
         let gauss = |width: f64| -> Vec<f64> {
             (0..4000).map(|i| 30.0 * (-((f64::from(i) - 1000.0) / width).powi(2)).exp()).collect()
         };
-        // a soft tip that lets go slowly
+        // a soft tip that releases slowly
         let tail = |width: f64| -> Vec<f64> {
             let t = |i: i32| (f64::from(i) - 1000.0) / width;
             (0..4000).map(|i| if t(i) < 0.0 { 0.0 } else { 30.0 * t(i) * (-2.0 * t(i)).exp() }).collect()

@@ -1,5 +1,5 @@
-//! The transform of a windowed record, as a whole or in [pieces](super::pieces), line after line in the [order](super::order) in which
-//! they come out.
+//! The transform of a windowed record, as a whole or in [pieces](super::pieces), with the lines in
+//! the [order](super::order) in which they are computed.
 
 use super::SpectraError;
 use super::half_length::HalfLength;
@@ -19,22 +19,23 @@ type C = Complex<f64>;
 /// A plan for records of one length.
 pub(super) struct RecordTransform {
     samples: usize,
-    /// Of a record that is transformed in pieces.
+    /// For a record that is transformed in pieces.
     pieces: Option<Pieces>,
-    /// Of piece 0, or of the record.
+    /// For piece 0, or for the whole record.
     real: HalfLength,
 }
 
 static KEPT: Mutex<Vec<Arc<RecordTransform>>> = Mutex::new(Vec::new());
-/// Plans kept at most.
+/// Number of plans kept.
 const PLANS: usize = 8;
-/// Samples from which on pieces pay: shorter transforms fit into the cache as they are.
+/// Number of samples from which pieces are faster: shorter transforms fit into the cache as a
+/// whole.
 const LONG: usize = 1 << 15;
 
 impl RecordTransform {
-    /// Plans are kept, for lengths that come again and again.
+    /// Returns a plan; plans are kept, since the same lengths recur.
     pub(super) fn of(samples: usize) -> Arc<RecordTransform> {
-        // the list is whole even if a thread that used it panicked
+        // the list is valid even after a poisoned lock
         let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(plan) = kept.iter().find(|plan| plan.samples == samples) {
             return plan.clone();
@@ -56,21 +57,21 @@ impl RecordTransform {
         }
     }
 
-    /// Lines of a record's spectrum.
+    /// Number of lines of a record's spectrum.
     pub(super) fn lines(&self) -> usize {
         self.samples / 2 + 1
     }
 
-    /// The order in which these lines are given.
+    /// The order in which these lines are computed.
     pub(super) fn order(&self, lines: Range<usize>) -> Order {
         Order::of(self.samples, self.pieces.is_some(), lines)
     }
 
-    /// Transforms a record, to which zeros are added up to the plan's length, and gives the lines of an
+    /// Transforms a record, zero-padded to the plan's length, and passes the lines of an
     /// [order](RecordTransform::order) to `to`.
     ///
     /// # Errors
-    /// A value that is not a number; then no line was given.
+    /// A value that is not finite; then no line was passed.
     #[inline(never)]
     pub(super) fn transform(
         &self,
@@ -114,7 +115,8 @@ impl RecordTransform {
         Ok(())
     }
 
-    /// Every sample is in the first point of the spectrum, so that it tells of one that is not a number.
+    /// Every sample contributes to the first point of the spectrum, so a value that is not finite
+    /// shows there.
     fn check(&self, record: Windowed<'_>, first: C) -> Result<(), SpectraError> {
         if (first.re + first.im).is_finite() {
             return Ok(());
@@ -160,7 +162,7 @@ mod tests {
         order.by_line(&found)
     }
 
-    /// Every way to transform records of so many samples.
+    /// All methods available for records of this many samples.
     fn plans(samples: usize) -> Vec<RecordTransform> {
         let pieces = samples.is_multiple_of(PARTS);
         [false, true]
@@ -210,13 +212,15 @@ mod tests {
             for plan in plans(samples) {
                 let found = lines(&plan, &record, 0..plan.lines());
                 let off: f64 = found.iter().zip(&whole).map(|(a, b)| (a - b).norm_sqr()).sum();
-                // an f64 holds 1.1e-16, of which a transform gathers a little at each of its passes
+                // the relative precision of an f64 is 1.1e-16, and each pass of a transform adds a
+                // little
                 assert!((off / power).sqrt() < 1e-15, "{samples} samples: {:e}", (off / power).sqrt());
             }
         }
     }
 
-    /// Blocks within the window, across its origin, and beyond the record's end, where zeros are added.
+    /// Blocks within the window, across its origin, and beyond the record's end, where zeros are
+    /// added.
     #[test]
     fn a_window_applied_on_the_way_in_is_that_of_the_windowed_record() {
         let (samples, recorded) = (6_400, 5_003);

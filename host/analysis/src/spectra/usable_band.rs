@@ -1,10 +1,12 @@
-//! The band in which the hammer really excited the structure.
+//! The band in which the hammer effectively excited the structure.
 
 use crate::band::Band;
 
-/// The band around the force auto-spectrum's maximum in which it stays within `drop_db` (6 dB by custom) of it.
+/// The band around the maximum of the force auto-spectrum in which the spectrum stays within
+/// `drop_db` (conventionally 6 dB) of it.
 ///
-/// `s_ff` is a power: −6 dB are a quarter. None when there is no line above 0 Hz or no force.
+/// `s_ff` is a power: −6 dB is a factor of four. `None` when there is no line above 0 Hz or no
+/// force.
 pub fn usable_band(frequency_hz: &[f64], s_ff: &[f64], drop_db: f64) -> Option<Band> {
     let first = frequency_hz.iter().position(|f| *f > 0.0)?;
     let n = frequency_hz.len().min(s_ff.len());

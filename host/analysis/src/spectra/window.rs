@@ -1,10 +1,11 @@
 //! Time windows: rectangular around the force pulse, exponential on the response.
 //!
-//! Multiplying every signal by e^(−σ(t − t₀)) turns the Fourier transform into the Laplace transform on s = σ + iω: with
-//! both force and response weighted, X(s) = H(s) F(s) holds *exactly*, and FRFs on one common s serve every method of
-//! substructuring unchanged. Weighting the response only is the widespread habit; over a pulse of half a millisecond it
-//! differs by a factor of about 1 + σ·0.2 ms, and the offset of t₀ from the pulse adds to it. Both are here, because
-//! records processed elsewhere must be reproducible.
+//! Multiplying every signal by e^(−σ(t − t₀)) turns the Fourier transform into the Laplace
+//! transform on s = σ + iω: with both force and response weighted, X(s) = H(s) F(s) holds
+//! *exactly*, and FRFs on one common s can be used in every method of substructuring unchanged.
+//! Weighting only the response is common practice; over a pulse of half a millisecond the result
+//! differs by a factor of about 1 + σ·0.2 ms, and the offset of t₀ from the pulse adds to it. Both
+//! are implemented, because records processed elsewhere must be reproducible.
 
 use super::pulse::Pulse;
 use crate::vectors::wide;
@@ -13,51 +14,56 @@ use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Whether the force is weighted exponentially too.
+/// Whether the force is weighted exponentially as well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ForceWeighting {
     /// e^(−σ(t − t₀)) on force and response, over the whole record: exactly H(σ + iω).
     Exponential,
-    /// The force rectangular only; the response weighted from t₀ on, and by 1 before.
+    /// The force only rectangularly; the response from t₀ on, with a weight of 1 before.
     Rectangular,
 }
 
-/// Windows of one measurement. Times are relative to the origin t₀ of a hit (its trigger or the start of its pulse).
+/// Windows of one measurement. Times are relative to the origin t₀ of a hit (its trigger or the
+/// start of its pulse).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Windowing {
-    /// The force is kept from this long before the origin, s, and always from where its pulse begins.
+    /// The force is kept from this long before the origin, s, or from the start of its pulse if
+    /// that is earlier.
     pub force_before_s: f64,
-    /// The force is kept until this long after the origin, s (ends included), and always until its pulse is over.
+    /// The force is kept until this long after the origin, s (ends included), or until the end of
+    /// its pulse if that is later.
     pub force_after_s: f64,
     /// After that it falls to zero along half a cosine of this length, s; 0 cuts it off.
     #[serde(default)]
     pub force_taper_s: f64,
-    /// Damping σ of the exponential window, 1/s; 0 is no window.
+    /// Damping σ of the exponential window, 1/s; 0 means no window.
     pub sigma_per_s: f64,
-    /// Whether the force is weighted too.
+    /// Whether the force is weighted as well.
     pub force_weighting: ForceWeighting,
 }
 
-/// The samples of a hit that its force window must hold.
+/// The samples of a hit that its force window must contain.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PulseSamples(Range<usize>);
 
 impl PulseSamples {
-    /// The force window holds the whole of `pulse`, which was found in `force_n`, however long it is.
+    /// The force window contains the whole of `pulse`, which was found in `force_n`, however long
+    /// it is.
     pub fn of(pulse: &Pulse, force_n: &[f64]) -> Self {
         PulseSamples(pulse.whole(force_n))
     }
 
-    /// The force window is placed by its times alone.
+    /// The force window is determined by its times only.
     pub fn none() -> Self {
         PulseSamples(0..0)
     }
 }
 
 impl Default for Windowing {
-    /// 1 ms before to 3 ms after the pulse's start holds the longest pulse of the automatic hammer; σ = 2.3 /s keeps the truncation of the
-    /// slowest mode (0.57 /s, 2 s records) under 0.3 %.
+    /// 1 ms before to 3 ms after the pulse's start contains the longest pulse of the automatic
+    /// hammer; σ = 2.3 /s keeps the truncation error of the slowest mode (0.57 /s, 2 s records)
+    /// under 0.3 %.
     fn default() -> Self {
         Windowing {
             force_before_s: 1e-3,
@@ -69,20 +75,22 @@ impl Default for Windowing {
     }
 }
 
-/// e^(−σ i/fs) of every sample i: made once for all channels and hits of one rate and length.
+/// e^(−σ i/fs) for every sample i, computed once for all channels and hits of one rate and length.
 ///
-/// A weight is the product of its run's and of its place in the run, so that the cache next to the core holds what all of them are made of.
+/// A weight is the product of that of its run and that of its place in the run, so that both tables
+/// fit into the first-level cache.
 #[derive(Debug, Clone)]
 pub struct Decay {
     fs_hz: f64,
     samples: usize,
-    /// Of the first sample of every run.
+    /// Weight of the first sample of every run.
     runs: Vec<f64>,
-    /// Of the samples of a run from its first on, and of as many after it: a run's length from any place on is one row.
+    /// Weights of the samples of a run from its first on, for two run lengths, so that one run
+    /// length from any place on is contiguous.
     places: Vec<f64>,
 }
 
-/// Samples in a run.
+/// Number of samples in a run.
 pub(super) const RUN: usize = 512;
 
 impl Decay {
@@ -96,7 +104,7 @@ impl Decay {
         self.runs[i / RUN] * self.places[i % RUN]
     }
 
-    /// Writes the samples `x` from `first` on, times their weights and `scale`.
+    /// Writes the samples `x`, which begin at index `first`, times their weights and `scale`.
     fn weigh(&self, x: &[f64], first: usize, scale: f64, out: &mut [f64]) {
         let (mut x, mut out, mut first) = (x, out, first);
         while !x.is_empty() {
@@ -112,14 +120,15 @@ impl Decay {
     }
 }
 
-/// Weights that were asked for, by their damping: of one rate, length and damping they are the same for every cell of a campaign.
+/// Computed weights, by their damping: for one rate, length and damping they are the same for every
+/// cell of a campaign.
 static KEPT: Mutex<Vec<(f64, Arc<Decay>)>> = Mutex::new(Vec::new());
 
-/// Kept at most.
+/// Number of weight tables kept.
 const KEPT_AT_MOST: usize = 8;
 
 impl Windowing {
-    /// As [`Windowing::decay`], made once where the same are asked for again.
+    /// As [`Windowing::decay`], but computed only once for repeated requests.
     pub(super) fn kept_decay(&self, fs_hz: f64, samples: usize) -> Arc<Decay> {
         let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |(sigma_per_s, decay): &&(f64, Arc<Decay>)| {
@@ -141,7 +150,8 @@ impl Windowing {
         Decay::of(self.sigma_per_s, fs_hz, samples)
     }
 
-    /// From when to when the force is kept, s from the record's start: what the times ask for, and all of `pulse`.
+    /// Start and end of the part of the force that is kept, s from the record's start: the
+    /// configured times, extended to include `pulse`.
     pub fn kept_s(&self, fs_hz: f64, origin_s: f64, pulse: &PulseSamples) -> [f64; 2] {
         let asked = [origin_s - self.force_before_s, origin_s + self.force_after_s];
         let Range { start, end } = pulse.0;
@@ -151,15 +161,16 @@ impl Windowing {
         [asked[0].min(start as f64 / fs_hz), asked[1].max((end - 1) as f64 / fs_hz)]
     }
 
-    /// The samples of a hit's force that the window keeps whole.
+    /// The samples of a hit's force that the window keeps at full weight.
     pub fn kept(&self, fs_hz: f64, samples: usize, origin_s: f64, pulse: &PulseSamples) -> Range<usize> {
         let [from, to] = self.kept_s(fs_hz, origin_s, pulse);
         let first = ((from * fs_hz).ceil().max(0.0) as usize).min(samples);
         first..((to * fs_hz).floor().max(-1.0) + 1.0).min(samples as f64).max(first as f64) as usize
     }
 
-    /// Writes the windowed force (N) of a hit with its origin at `origin_s` from the record's start into `out`; what `out` is longer
-    /// than the record (zero padding) becomes 0. The window holds all of `pulse`.
+    /// Writes the windowed force (N) of a hit with its origin at `origin_s` from the record's start
+    /// into `out`; the part of `out` beyond the record (zero padding) becomes 0. The window
+    /// contains all of `pulse`.
     pub fn force_into(
         &self,
         force_n: &[f64],
@@ -182,7 +193,7 @@ impl Windowing {
             ForceWeighting::Rectangular => scale,
         };
         let time = |i: &usize| *i as f64 / decay.fs_hz;
-        // samples' times only grow: what is kept whole is one run
+        // sample times increase, so the part kept at full weight is contiguous
         let begin = (first..last).find(|i| time(i) >= from).unwrap_or(last);
         let guess = ((to * decay.fs_hz).max(0.0) as usize).saturating_sub(1).clamp(begin, last);
         let end = (guess..last).find(|i| time(i) > to).unwrap_or(last);
@@ -200,9 +211,9 @@ impl Windowing {
         }
     }
 
-    /// How the responses of the same hit are weighted.
+    /// The weights for the responses of the same hit.
     pub fn of_response<'d>(&self, decay: &'d Decay, origin_s: f64) -> ResponseWeighting<'d> {
-        // what is before the origin stays as it is where only the response is weighted
+        // if only the response is weighted, samples before the origin remain unchanged
         let plain = if self.force_weighting == ForceWeighting::Rectangular && self.sigma_per_s != 0.0 {
             let samples = decay.samples;
             (0..samples).position(|i| i as f64 / decay.fs_hz > origin_s).unwrap_or(samples)
@@ -216,25 +227,26 @@ impl Windowing {
 /// The window of a hit's responses.
 pub struct ResponseWeighting<'d> {
     decay: &'d Decay,
-    /// Samples from the record's start that stay as they are.
+    /// Number of samples from the record's start that remain unchanged.
     plain: usize,
     scale: f64,
 }
 
 impl ResponseWeighting<'_> {
-    /// The weights of the samples from the first of a run on.
+    /// The weights of the samples of a run, from its first on.
     pub(super) fn places(&self) -> &[f64] {
         &self.decay.places
     }
 
-    /// The weights of up to [`RUN`] samples from the `first` on: a number, and from which on of the
-    /// [places](ResponseWeighting::places) it is to be multiplied with. None of samples that stay as they are beside ones that do not.
+    /// The weights of up to [`RUN`] samples from `first` on: a factor, and the index from which on
+    /// it multiplies the [places](ResponseWeighting::places). `None` if any of the samples remains
+    /// unchanged.
     pub(super) fn weights(&self, first: usize) -> Option<(f64, usize)> {
         (first >= self.plain).then(|| (self.scale * self.decay.runs[first / RUN], first % RUN))
     }
 
-    /// Writes a windowed response (SI) from its sample `first` on into `out`; what `out` goes beyond the record (zero padding)
-    /// becomes 0.
+    /// Writes a windowed response (SI) from its sample `first` on into `out`; the part of `out`
+    /// beyond the record (zero padding) becomes 0.
     pub fn response_into(&self, response: &[f64], first: usize, out: &mut [f64]) {
         let kept = response.len().saturating_sub(first).min(out.len());
         let plain = self.plain.saturating_sub(first).min(kept);
@@ -266,7 +278,7 @@ mod tests {
         assert_eq!(kept[..], force[..], "a pulse of 30 ms");
         w.force_into(&force, &w.decay(2000.0, 400), origin_s, &PulseSamples::none(), &mut kept);
         assert!(kept[50..].iter().all(|f| *f == 0.0), "3 ms are six samples");
-        // a short one leaves the window as it is
+        // a short pulse does not change the window
         let range = w.kept(2000.0, 400, 0.1, &PulseSamples(199..205));
         assert_eq!(range, w.kept(2000.0, 400, 0.1, &PulseSamples::none()));
         assert_eq!(w.kept(2000.0, 400, 0.1, &PulseSamples(190..240)), 190..240);
@@ -299,7 +311,7 @@ mod tests {
         // full at 6 ms, half at 8 ms, none at 10 ms
         assert!((kept[8] - 0.5).abs() < 1e-12 && kept[6] == 1.0 && kept[10].abs() < 1e-12, "{kept:?}");
         assert!(kept[7] > kept[8] && kept[8] > kept[9] && kept[11..] == [0.0; 3], "{kept:?}");
-        // a window beyond the record is no fault
+        // a window beyond the record is not an error
         w.force_into(&[1.0; 3], &w.decay(1000.0, 3), 9.0, &PulseSamples::none(), &mut kept);
         assert_eq!(kept, [0.0; 14]);
     }
@@ -334,7 +346,7 @@ mod tests {
             decay.weigh(&vec![2.0; end - first], first, 3.0, &mut out);
             for (i, out) in (first..end).zip(out) {
                 let exact = 6.0 * (-40.0 * i as f64 / 1000.0).exp();
-                // the exponents' rounding, and three products'
+                // rounding of the exponents, and of three products
                 assert!(
                     (out - exact).abs() < 1e-14 * exact && decay.weight(i) > 0.0,
                     "{i}: {out} for {exact}"

@@ -1,8 +1,8 @@
-//! A record and the window it is seen through: transforms weigh samples where they read them.
+//! A record together with its window: transforms apply the weights while reading the samples.
 
 use super::window::{RUN, ResponseWeighting};
 
-/// A record, times its window, and zeros after its end.
+/// A record times its window, followed by zeros.
 #[derive(Clone, Copy)]
 pub struct Windowed<'a> {
     samples: &'a [f64],
@@ -13,17 +13,17 @@ pub struct Windowed<'a> {
 static ONES: [f64; RUN] = [1.0; RUN];
 
 impl<'a> Windowed<'a> {
-    /// A record as it is.
+    /// A record without a window.
     pub fn plain(samples: &'a [f64]) -> Self {
         Windowed { samples, weighting: None }
     }
 
-    /// A response, SI, through its window.
+    /// A response, SI, with its window.
     pub fn response(samples: &'a [f64], weighting: &'a ResponseWeighting<'a>) -> Self {
         Windowed { samples, weighting: Some(weighting) }
     }
 
-    /// Writes the windowed samples from the `first` on into `out`.
+    /// Writes the windowed samples from `first` on into `out`.
     pub(super) fn write(self, first: usize, out: &mut [f64]) {
         if let Some(weighting) = self.weighting {
             return weighting.response_into(self.samples, first, out);
@@ -39,13 +39,14 @@ impl<'a> Windowed<'a> {
         self.samples
     }
 
-    /// Weights that recur in the window.
+    /// Weights that are common to all runs of the window.
     pub(super) fn places(self) -> &'a [f64] {
         self.weighting.map_or(&ONES, ResponseWeighting::places)
     }
 
-    /// The weights of `count` samples (up to [`RUN`]) from the `first` on: a number, and from which on of the
-    /// [places](Windowed::places) it is to be multiplied with. None where samples are of more than one kind.
+    /// The weights of `count` samples (up to [`RUN`]) from `first` on: a factor, and the index from
+    /// which on it multiplies the [places](Windowed::places). `None` if the samples cannot be
+    /// weighted uniformly.
     pub(super) fn weights(self, first: usize, count: usize) -> Option<(f64, usize)> {
         if first + count > self.samples.len() {
             return None;
@@ -73,7 +74,8 @@ mod tests {
                 let places = &record.places()[place..][..RUN];
                 for (i, (written, place)) in written.iter().zip(places).enumerate() {
                     let exact = record.samples()[first + i] * (scale * place);
-                    // the rounding of the weights, which are products of others' after the end of a run
+                    // rounding of the weights, which after the end of a run are computed from
+                    // different products
                     assert!((written - exact).abs() < 1e-14 * exact, "{}: {written} for {exact}", first + i);
                 }
             }

@@ -1,43 +1,43 @@
-//! Whether A and B, coupled by the joint found, are the measured assembly.
+//! Checks whether A and B, coupled by the joint found, reproduce the measured assembly.
 
 use crate::results::MAIN_BAND;
 use crate::substructuring::explained::{BEYOND, Explained, USUAL};
 
-/// Up to here the default bands reach; what lies above costs no result, Hz.
+/// Upper end of the default bands, Hz; deviations above it affect no result.
 const USED_HZ: f64 = 800.0;
-/// Where errors of position and noise alone may be off by this part, nothing can be told.
+/// If errors of position and noise alone can cause this relative error, the check is undecided.
 const BLIND: f64 = 1.0;
 
-/// How well the joint of the main band, with A and B, describes the assembly.
+/// Accuracy with which the joint of the main band, together with A and B, reproduces the assembly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BackCoupled {
-    /// Where it does.
+    /// Frequency range in which it does.
     pub reach: Reach,
     /// Relative error, median over the main band.
     pub median_error: f64,
-    /// The part of it that noise and errors of position explain.
+    /// The part of this error that noise and errors of position explain.
     pub median_explained: f64,
 }
 
-/// From where to where the assembly is described, Hz.
+/// Frequency range in which the assembly is reproduced, Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reach {
-    /// Noise and errors of position leave nothing to be told.
+    /// Undecided because of noise and errors of position.
     Untold,
-    /// Everywhere, but off by more than is usual.
+    /// Everywhere, but with a larger error than usual.
     Doubtful,
-    /// Over all that the bands use.
+    /// Over the full range used by the bands.
     Whole([f64; 2]),
-    /// Over the main band, and no further than here.
+    /// Over the main band, but only up to this frequency.
     UpTo(f64),
-    /// Not over the whole of the main band.
+    /// Only over a part of the main band.
     Within([f64; 2]),
     /// Nowhere.
     Nowhere,
 }
 
 impl BackCoupled {
-    /// None without a line in the main band.
+    /// `None` without a line in the main band.
     pub fn of(found: &Explained) -> Option<Self> {
         let [median_error, median_explained] = found.medians(MAIN_BAND)?;
         let last = *found.frequency_hz.last()?;
@@ -55,7 +55,7 @@ impl BackCoupled {
         Some(Self { reach, median_error, median_explained })
     }
 
-    /// Passed, failed, or none where the data cannot say.
+    /// Passed, failed, or `None` if undecided.
     pub fn ok(&self) -> Option<bool> {
         match self.reach {
             Reach::Untold | Reach::Doubtful => None,
@@ -64,7 +64,7 @@ impl BackCoupled {
         }
     }
 
-    /// Where it stops to describe the assembly, Hz.
+    /// Frequency at which the assembly is no longer reproduced, Hz.
     pub fn edge_hz(&self) -> Option<f64> {
         match self.reach {
             Reach::UpTo(to) => Some(to),
@@ -78,7 +78,8 @@ impl BackCoupled {
 mod tests {
     use super::*;
 
-    /// An error of 2 % below a frequency and of `above` from there on, where errors of position explain 6 %.
+    /// An error of 2 % below a frequency and of `above` from it on, with errors of position that
+    /// explain 6 %.
     fn found(edge_hz: f64, above: f64) -> Explained {
         let frequency_hz: Vec<f64> = (10..1000).map(f64::from).collect();
         Explained {
@@ -109,9 +110,9 @@ mod tests {
         let path = check(&found(700.0, 0.6));
         assert_eq!((path.ok(), path.edge_hz()), (Some(false), Some(699.0)));
         assert_eq!(path.reach, Reach::UpTo(699.0));
-        // beyond what any band uses it costs nothing
+        // deviations beyond the range of all bands have no effect
         assert_eq!(check(&found(900.0, 0.6)).ok(), Some(true));
-        // in the main band it is not a path above
+        // within the main band, so it is not a limit above it
         let inside = check(&found(500.0, 0.6));
         assert_eq!((inside.ok(), inside.edge_hz()), (Some(false), Some(499.0)));
         assert_eq!(check(&found(0.0, 0.6)).reach, Reach::Nowhere);

@@ -1,27 +1,28 @@
-//! Whether the contact changed while it was measured: the shaker's levels before and after the hammer's cells.
+//! Checks whether the contact changed during the measurement: the shaker's levels before and after
+//! the hammer's cells.
 
 use crate::analyse::shaker_levels::Analysed;
 use crate::campaign::plan::level::{Level, Moment};
 use crate::hysteresis::OverCycles;
 
-/// A level's stiffness may differ by this part before and after.
+/// Accepted relative change of a level's stiffness between before and after.
 const CHANGE: f64 = 0.03;
 
 /// The levels that were measured both times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactChange {
-    /// How many.
+    /// Number of such levels.
     pub pairs: u32,
-    /// How many of them differ beyond their scatter.
+    /// Number of them whose change exceeds their scatter.
     pub beyond: u32,
-    /// The largest change, as a part of the stiffness before.
+    /// The largest change, relative to the stiffness before.
     pub worst: f64,
-    /// The level that has it.
+    /// The level with the largest change.
     pub worst_at: Level,
 }
 
 impl ContactChange {
-    /// None where no level was measured both times.
+    /// `None` if no level was measured both times.
     pub fn of(levels: &[Analysed<'_>]) -> Option<Self> {
         let of = |moment: Moment| levels.iter().filter(move |l| l.level.moment == moment);
         let slope = |one: &Analysed<'_>| one.raw.k_t_n_per_m.unwrap_or(one.raw.k_eq_n_per_m);

@@ -1,21 +1,22 @@
-//! Whether n_i internals see all n_c interface motions: both forms of Eq. (3) with the most modes.
+//! Checks whether n_i internal points resolve all n_c interface motions, for both forms of Eq. (3)
+//! with the most modes.
 
 use crate::substructuring::identify::{Identification, Internals};
 use crate::substructuring::{Method, Refused};
 
-/// What Eq. (3) had; each none where it was not asked for, or where nothing was refused.
+/// Internal points in Eq. (3); each is `None` if it was not requested, or if nothing was refused.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InternalsFound {
-    /// In least squares.
+    /// For the least-squares form.
     pub least_squares: Option<Internals>,
-    /// Why some set of modes was refused in least squares.
+    /// Why a set of modes was refused in the least-squares form.
     pub refused: Option<Refused>,
-    /// As printed.
+    /// For the printed form.
     pub printed: Option<Internals>,
 }
 
 impl InternalsFound {
-    /// n_i against n_c, and the ranks of P and Q; none where neither form was asked for.
+    /// n_i and n_c, and the ranks of P and Q; `None` if neither form was requested.
     pub fn of(found: &Identification) -> Option<Self> {
         let most = |method: Method| {
             found.internals.iter().filter(|i| i.method == method).max_by_key(|i| i.idms).cloned()
@@ -27,12 +28,13 @@ impl InternalsFound {
         asked.then_some(Self { least_squares, refused, printed })
     }
 
-    /// Whether they suffice for every set of modes.
+    /// Whether they are sufficient for every set of modes.
     pub fn ok(&self) -> bool {
         self.refused.is_none() && self.least_squares.as_ref().is_some_and(is_full)
     }
 
-    /// Whether the printed form is exact: as many internals as interface motions, and all of them seen.
+    /// Whether the printed form is exact: as many internal points as interface motions, with full
+    /// rank.
     pub fn printed_is_exact(&self) -> bool {
         self.printed.as_ref().is_some_and(|i| i.impacts == i.idms && i.responses == i.idms && is_full(i))
     }

@@ -1,30 +1,31 @@
-//! Whether a resonance hides that only one specimen takes part in.
+//! Checks for a hidden resonance that only one specimen takes part in.
 
 use crate::hysteresis::compliance::{ContactCompliance, ImaginaryPeak};
 use crate::hysteresis::phase_split::{Curve, PhaseSplit};
 use crate::hysteresis::repeated_peak::{CLEAR, over_noise};
 use crate::results::{FrfCurve, Role};
 
-/// Less phase than this between the specimens hides nothing.
+/// If the phase between the specimens stays below this, nothing is hidden.
 const QUIET: f64 = 0.25;
 
-/// What Δx/T says between 100 and 400 Hz.
+/// Verdict from Δx/T between 100 and 400 Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HiddenResonance {
-    /// The contact's signals are not here.
+    /// The contact's signals are not available.
     NoSignals,
     /// Too few lines.
     TooFewLines,
-    /// A resonance of one specimen in its clamp, and the phases that tell whose, where the curves for it are here.
+    /// A resonance of one specimen in its clamp, and the phases that identify the specimen, if the
+    /// curves needed for it are available.
     Found(ImaginaryPeak, Option<PhaseSplit>),
     /// Both specimens move in phase with the force.
     Quiet(ImaginaryPeak),
-    /// Some phase, not clear of the noise.
+    /// Some phase difference, but not significant against the noise.
     Unclear(ImaginaryPeak),
 }
 
 impl HiddenResonance {
-    /// Looks for it in one compliance.
+    /// Searches one compliance.
     pub fn in_compliance(contact: &ContactCompliance) -> Self {
         match contact.imaginary_peak() {
             None => Self::TooFewLines,
@@ -34,8 +35,8 @@ impl HiddenResonance {
         }
     }
 
-    /// The clearest answer of hits and sweeps; of equal ones that of the hits. A peak of the hits must be in each of some `groups` of them, where
-    /// there are enough.
+    /// The clearest verdict from hits and sweeps; among equals, that of the hits. A peak from the
+    /// hits must be present in each of several `groups` of them, if there are enough.
     pub fn of(
         hits: Option<&ContactCompliance>,
         groups: &[ContactCompliance],
@@ -54,11 +55,12 @@ impl HiddenResonance {
             Some(true) => 1,
             None => 0,
         };
-        // the last of equals counts
+        // max_by_key returns the last of equal elements
         sweeps.iter().map(Self::in_compliance).chain([of_hits]).max_by_key(rank).unwrap_or(of_hits)
     }
 
-    /// The same with the phases of specimens and arms, where it was found and the curves are all there.
+    /// Adds the phases of specimens and arms, if a resonance was found and all curves are
+    /// available.
     #[must_use]
     pub fn with_phases(self, curves: &[FrfCurve]) -> Self {
         match self {
@@ -67,7 +69,7 @@ impl HiddenResonance {
         }
     }
 
-    /// Passed, failed, or none where the data cannot say.
+    /// Passed, failed, or `None` if undecided.
     pub fn ok(&self) -> Option<bool> {
         match self {
             Self::Found(..) => Some(false),
@@ -76,7 +78,7 @@ impl HiddenResonance {
         }
     }
 
-    /// Where the resonance is, Hz.
+    /// Frequency of the resonance, Hz.
     pub fn resonance_hz(&self) -> Option<f64> {
         if let Self::Found(peak, _) = self { Some(peak.frequency_hz) } else { None }
     }

@@ -1,4 +1,4 @@
-//! Whether the numbers may be believed: one file for each question that is put to them, with what was measured.
+//! Checks of the credibility of the numbers: one file per check, with the figures behind it.
 
 mod back_coupled;
 mod contact_change;

@@ -1,11 +1,11 @@
-//! Whether six rigid motions are enough to describe what coupling adds.
+//! Checks whether six rigid motions suffice to describe the motion that coupling adds.
 
 use crate::substructuring::cmif::Cmif;
 
-/// Six rigid motions must explain this part of what coupling adds.
+/// Fraction of the motion added by coupling that six rigid motions must explain.
 const RIGID: f64 = 0.9;
 
-/// Whether they do; none where the CMIF does not say.
+/// Whether they do; `None` if the CMIF does not decide it.
 pub fn rigid_motions_suffice(found: &Cmif) -> Option<bool> {
     found.explained.get(&6).filter(|six| !six.is_nan()).map(|six| *six >= RIGID)
 }

@@ -1,39 +1,40 @@
-//! Whether A and B are the same structures in all configurations.
+//! Checks whether A and B are the same structures in all configurations.
 
 use crate::identified::SCATTER_OF_LINES;
 use crate::results::MAIN_BAND;
 use crate::substructuring::identify::Identification;
 use crate::substructuring::{BandStatistic, Dof, JointSpectrum, Method};
 
-/// A difference of this part of the stiffness matters.
+/// A smaller relative difference of the stiffness is ignored.
 const MATTERS: f64 = 0.1;
 
-/// What Eq. (A.1), which needs neither A nor B alone, and the blocks of Eq. (A.2), which need one of them each, say of k_z over the
-/// main band: where they differ by more than their lines scatter, that substructure is another one in the assembly than alone
-/// (a clamp that sits otherwise under load, a wire in place of a rod).
+/// k_z over the main band by Eq. (A.1), which uses neither A nor B alone, compared with that of the
+/// blocks of Eq. (A.2), which use one of them each. If they differ by more than the scatter of
+/// their lines, that substructure differs between the assembly and alone (a clamp that seats
+/// differently under load, a wire instead of a rod).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SameStructures {
-    /// What follows from it.
+    /// The verdict.
     pub sameness: Sameness,
     /// By Eq. (A.1), N/m.
     pub inverse_n_per_m: f64,
-    /// What the blocks of A and B of Eq. (A.2) give beyond that, N/m.
+    /// Difference between the values of the blocks of A and B of Eq. (A.2) and that value, N/m.
     pub differences_n_per_m: [(&'static str, f64); 2],
 }
 
-/// Whether they are the same.
+/// Verdict on whether they are the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sameness {
-    /// The lines scatter too much to tell.
+    /// The scatter of the lines is too large to decide.
     Untold,
-    /// Nothing shows a difference.
+    /// No significant difference.
     Same,
-    /// These differ: A, B.
+    /// Whether A and B, respectively, differ.
     Changed([bool; 2]),
 }
 
 impl SameStructures {
-    /// None without these methods.
+    /// `None` without these methods.
     pub fn of(found: &Identification) -> Option<Self> {
         let (reference, inverse) = sliding(found, Method::Inverse)?;
         let inside: Vec<usize> =
@@ -63,7 +64,7 @@ impl SameStructures {
         Some(Self { sameness, inverse_n_per_m: k.mean, differences_n_per_m })
     }
 
-    /// Passed, failed, or none where the data cannot say.
+    /// Passed, failed, or `None` if undecided.
     pub fn ok(&self) -> Option<bool> {
         match self.sameness {
             Sameness::Untold => None,
@@ -73,7 +74,7 @@ impl SameStructures {
     }
 }
 
-/// k_z of a method with the most modes.
+/// k_z of a method with its largest set of modes.
 fn sliding(found: &Identification, method: Method) -> Option<(&JointSpectrum, &[f64])> {
     let spectra = found.spectra.iter().filter(|s| s.method == method.name());
     let spectrum = spectra.max_by_key(|s| s.idms)?;

@@ -1,4 +1,5 @@
-//! Whether something gives way between the arms' points and the contact: FBS against loops.
+//! Checks for a compliance in series between the arms' points and the contact, by comparing FBS
+//! with loops.
 
 use crate::hysteresis::OverCycles;
 use crate::identified::SCATTER_OF_LINES;
@@ -8,14 +9,15 @@ use crate::substructuring::direct::Direct;
 use crate::substructuring::joint_over_bands::NORMAL_95;
 use crate::substructuring::{BandStatistic, Dof, JointRow};
 
-/// Loops stiffer than FBS by more than this: something between arm and specimen gives way.
+/// If loops are stiffer than FBS by more than this factor, there is a compliance between arm and
+/// specimen.
 const SERIES_RATIO: f64 = 1.5;
 
-/// A scatter of T/Δx over lines below this fraction of its mean is clear enough to compare with.
+/// The relative scatter of T/Δx over lines must be below this for the comparison.
 const CLEAR: f64 = 0.3;
 
-/// What FBS sees between the arms over the main band: the recommended estimate where it identified something, or the
-/// headline's row.
+/// The FBS stiffness between the arms over the main band: the recommended estimate if it identified
+/// one, otherwise the headline's row.
 pub fn between_the_arms<'a>(
     recommended: &[Averaged],
     rows: impl Iterator<Item = &'a JointRow>,
@@ -35,7 +37,8 @@ pub fn between_the_arms<'a>(
         })
 }
 
-/// What the specimens' own vibrometers see: T/Δx in frequency where it is clear, or the impacts' loops.
+/// The stiffness from the vibrometers on the specimens: T/Δx in the frequency domain if its scatter
+/// is low enough, otherwise the impacts' loops.
 pub fn at_the_specimens(direct: Option<&Direct>, loops: Option<OverCycles>) -> Option<OverCycles> {
     direct
         .map(|direct| (direct.stiffness_n_per_m, direct.lines))
@@ -44,44 +47,44 @@ pub fn at_the_specimens(direct: Option<&Direct>, loops: Option<OverCycles>) -> O
         .or(loops)
 }
 
-/// The same stiffness by both, N/m.
+/// The stiffness from both, N/m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
-    /// What FBS sees between the arms.
+    /// FBS between the arms.
     pub fbs_n_per_m: f64,
-    /// What is seen at the specimens.
+    /// Loops at the specimens.
     pub loops_n_per_m: f64,
 }
 
 impl Sizes {
-    /// How many times stiffer it is at the specimens.
+    /// Ratio of the stiffness at the specimens to that between the arms.
     pub fn ratio(&self) -> f64 {
         self.loops_n_per_m / self.fbs_n_per_m
     }
 }
 
-/// What FBS between the arms and the loops at the specimens say together.
+/// Result of comparing FBS between the arms with the loops at the specimens.
 ///
-/// A flexible clamp lies between the arms' points and the contact, but not between the laser spots and the
-/// contact: then 1/k_FBS = 1/k_T + 1/k_clamp.
+/// A flexible clamp lies between the arms' points and the contact, but not between the vibrometers'
+/// points and the contact; then 1/k_FBS = 1/k_T + 1/k_clamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SeriesCompliance {
-    /// Only one of them is here.
+    /// Only one of them is available.
     NotBoth,
     /// FBS did not identify a stiffness.
     NotIdentified,
-    /// The loops are stiffer: something between arms and contact has this compliance.
+    /// The loops are stiffer: there is this compliance between arms and contact.
     ClampGivesWay {
-        /// Both.
+        /// Both stiffnesses.
         sizes: Sizes,
-        /// Of what lies between, m/N.
+        /// The series compliance, m/N.
         compliance_m_per_n: f64,
         /// Its standard deviation, m/N.
         std_m_per_n: f64,
     },
     /// The loops are softer, which no series compliance explains.
     Softer(Sizes),
-    /// Both are of one size.
+    /// Both agree.
     SameSize(Sizes),
 }
 
@@ -95,7 +98,7 @@ impl SeriesCompliance {
         }
         let sizes = Sizes { fbs_n_per_m: k_fbs, loops_n_per_m: k_loops };
         if sizes.ratio() > SERIES_RATIO {
-            // independent measurements: the compliances' variances add
+            // independent measurements, so the variances of the compliances add
             let std_m_per_n = (fbs.std / (k_fbs * k_fbs)).hypot(loops.std / (k_loops * k_loops));
             return Self::ClampGivesWay {
                 sizes,
@@ -109,7 +112,7 @@ impl SeriesCompliance {
         Self::SameSize(sizes)
     }
 
-    /// Passed, failed, or none where the data cannot say.
+    /// Passed, failed, or `None` if undecided.
     pub fn ok(&self) -> Option<bool> {
         match self {
             Self::ClampGivesWay { .. } => Some(false),
@@ -118,7 +121,8 @@ impl SeriesCompliance {
         }
     }
 
-    /// Stiffness of what lies between arms and contact, with the ends of its 95 % interval, N/m; without an upper end it is infinite.
+    /// Stiffness between arms and contact, with the ends of its 95 % interval, N/m; an upper end
+    /// that does not exist is infinite.
     pub fn between_n_per_m(&self) -> Option<[f64; 3]> {
         let Self::ClampGivesWay { compliance_m_per_n, std_m_per_n, .. } = self else { return None };
         let (c, std) = (compliance_m_per_n, std_m_per_n);
@@ -147,7 +151,8 @@ mod tests {
         assert_eq!(check.ok(), Some(false));
         let [series, low, high] = check.between_n_per_m().expect("the clamp gives way");
         assert!((series / 31.2e6 - 1.0).abs() < 1e-9);
-        // σ of the two compliances: 1e6/26.59e6² and 4e6/180e6², in quadrature 1.42e-9 m/N of 32.05e-9
+        // σ of the two compliances: 1e6/26.59e6² and 4e6/180e6², in quadrature 1.42e-9 m/N of
+        // 32.05e-9
         assert!((low / 28.7e6 - 1.0).abs() < 0.01 && (high / 34.2e6 - 1.0).abs() < 0.01, "{low:e} {high:e}");
     }
 

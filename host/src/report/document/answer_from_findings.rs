@@ -1,4 +1,4 @@
-//! The answer, from what was found.
+//! Builds the answer from the findings.
 
 use crate::analyse::Findings;
 use crate::contact::{Interval, Joint, Stiffness};
@@ -8,7 +8,7 @@ use crate::results::{Answer, Basis, BetweenArms, Clamp, ContactAnswer, Slip};
 use crate::substructuring::between_arms::Basis as Estimate;
 use crate::substructuring::joint_over_bands::NORMAL_95;
 
-/// The answer of a campaign; none where no campaign was analysed.
+/// The answer of a campaign; `None` if no campaign was analysed.
 pub fn answer(found: &Findings) -> Option<Answer> {
     let own = found.own_stiffness.as_ref()?;
     let slip = slip(found);
@@ -74,7 +74,7 @@ fn between_arms(found: &Findings) -> BetweenArms {
             },
             why: say::between_the_arms(between.basis),
         },
-        // without three configurations nobody could ask
+        // without all three configurations there is no estimate
         Some(Err(_)) if found.substructured.is_none() => {
             BetweenArms { k_n_per_m: None, basis: "none", why: say::without_all_three() }
         }
@@ -83,7 +83,7 @@ fn between_arms(found: &Findings) -> BetweenArms {
     }
 }
 
-/// What is left of the whole's compliance when the contact's is taken away; none unless that is clearly something.
+/// The compliance of the whole minus that of the contact; `None` unless it is significant.
 fn clamp(own: Interval, whole: Interval) -> Option<Clamp> {
     let compliance = whole.mean.recip() - own.mean.recip();
     let sigma = |i: Interval| (i.ci95[0].recip() - i.ci95[1].recip()) / (2.0 * NORMAL_95);

@@ -1,16 +1,17 @@
-//! Two campaigns against each other: before and after wear, under two loads, with two contacts.
+//! Compares two campaigns: before and after wear, under two loads, with two contacts.
 
 use crate::contact::Interval;
 use crate::report::words::comparison_sentences::{lacking, verdict};
 use crate::results::{Compared, Difference, Force, Hysteresis, Results, VERSION};
 
-/// The same level of the shaker: frequencies are held to parts of a thousand, amplitudes to some per cent.
+/// Relative tolerance within which two levels of the shaker count as the same: frequencies are
+/// reproduced to some parts per thousand, amplitudes to some per cent.
 const SAME_FREQUENCY: f64 = 2e-3;
 /// See [`SAME_FREQUENCY`].
 const SAME_AMPLITUDE: f64 = 0.06;
 
-/// Everything that both have. The errors of two campaigns count as independent: where they share a rig and its gains, the true
-/// interval of the difference is narrower.
+/// Compares everything that both have. The errors of two campaigns are assumed independent: if they
+/// share a rig and its gains, the true interval of the difference is narrower.
 pub fn compare(a: &Results, b: &Results) -> Compared {
     let (mut differences, mut missing) = (Vec::new(), Vec::new());
     let mut put = |quantity: &str, unit, a: Option<Interval>, b: Option<Interval>| match (a, b) {
@@ -58,7 +59,7 @@ fn difference(quantity: String, unit: &'static str, a: Interval, b: Interval) ->
     }
 }
 
-/// Levels that both measured: k_T where both know it, else the slope of the straight loop.
+/// Levels that both measured: k_T if known in both, otherwise the slope of the straight loop.
 fn levels(a: &Results, b: &Results) -> Vec<Difference> {
     let steady = |r: &Hysteresis| r.level.is_some() && r.force == Force::Raw;
     let pairs = a.hysteresis.iter().filter(|r| steady(r)).filter_map(|x| {

@@ -1,10 +1,10 @@
-//! What is known of the interface, in the shape of the results.
+//! Converts the findings on the interface to the format of the results.
 
 use crate::results::{InterfaceModes, MAIN_BAND, VirtualPoint, rounded};
 use crate::substructuring::VirtualPointQuality;
 use crate::substructuring::cmif::Cmif;
 
-/// Curves of the CMIF that are kept: twelve interface motions at most, and the first beyond them.
+/// Number of CMIF curves kept: at most twelve interface motions, and the first beyond them.
 const CURVES: usize = 13;
 
 /// Quality of one virtual point.

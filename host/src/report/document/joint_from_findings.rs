@@ -1,4 +1,4 @@
-//! The joint in the shape of the results.
+//! Converts the findings on the joint to the format of the results.
 
 use crate::analyse::{Findings, Row, Substructured};
 use crate::report::words::warning_sentences;
@@ -8,7 +8,7 @@ use crate::substructuring::fit::{self, Fitted};
 use crate::substructuring::{BandStatistic, Dof, JointRow};
 use std::collections::BTreeMap;
 
-/// The rows, and what was refused: methods line by line, fits, T/Δx.
+/// The rows, and what was refused: line-by-line methods, fits, T/Δx.
 pub fn rows(found: &Findings) -> (Vec<Joint>, Vec<Refusal>) {
     let of_frfs = found.substructured.as_ref();
     let mut joint: Vec<Joint> = of_frfs.iter().flat_map(|s| &s.rows).map(by_line).collect();
@@ -86,14 +86,15 @@ fn of_row(row: &JointRow) -> Joint {
     }
 }
 
-/// Significant digits of a curve: what six digits of an FRF can carry.
+/// Significant digits of a curve: FRFs have six digits.
 const DIGITS: i32 = 6;
-/// Of a line's standard deviation, which a few hits tell to a tenth at best.
+/// Digits of a line's standard deviation, which a few hits determine to a tenth at best.
 const NOISE_DIGITS: i32 = 3;
-/// Of a line's damping, which scatters more than its stiffness; every mean is computed before this.
+/// Digits of a line's damping, which scatters more than its stiffness; all means are computed
+/// before rounding.
 const DAMPING_DIGITS: i32 = 4;
 
-/// Translations line by line: they are what the figures show. None where nothing was identified.
+/// Translations line by line, as shown in the figures. `None` if nothing was identified.
 pub fn spectrum(found: &Substructured) -> Option<JointSpectrum> {
     let mut curves = Vec::new();
     for (spectrum, noise) in &found.spectra {

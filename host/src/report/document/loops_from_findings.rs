@@ -1,11 +1,12 @@
-//! The loops in the shape of the results.
+//! Converts the findings on the loops to the format of the results.
 
 use crate::analyse::{Contact, Findings, ImpactLoops, RecordLoops, SlopeIs};
 use crate::hysteresis::{Kind, LoopAnalysis, OverCycles};
 use crate::report::words::{level_sentences, warning_sentences};
 use crate::results::{DecayStep, Force, Hysteresis, ranges};
 
-/// The impacts together, the shaker's levels, and a record of its own: each with the raw force, then with the corrected one.
+/// The impacts together, the shaker's levels, and a separate record: each with the raw force, then
+/// with the corrected one.
 pub fn rows(found: &Findings) -> Vec<Hysteresis> {
     let contact = found.contact.as_ref();
     let mut rows: Vec<Hysteresis> =
@@ -52,7 +53,8 @@ fn of_impacts(impacts: &ImpactLoops) -> Vec<Hysteresis> {
     rows
 }
 
-/// All raw, then all corrected; `resonance_hz` is one of a specimen, which moves Δx at every frequency.
+/// All rows with the raw force, then all with the corrected one; `resonance_hz` is a resonance of a
+/// specimen, which affects Δx at every frequency.
 fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hysteresis> {
     let row = |one: &RecordLoops, found: &LoopAnalysis, force| {
         let mut row = of_record(found, force);
@@ -70,7 +72,7 @@ fn of_records(records: &[RecordLoops], resonance_hz: Option<f64>) -> Vec<Hystere
     raw.chain(records.iter().filter_map(corrected)).collect()
 }
 
-/// The row of a level with what is known of the contact itself.
+/// The row of a level, with the results for the contact alone added.
 fn at_the_contact(row: Hysteresis, one: &RecordLoops) -> Hysteresis {
     match &one.own {
         None => row,
@@ -89,7 +91,7 @@ fn at_the_contact(row: Hysteresis, one: &RecordLoops) -> Hysteresis {
     }
 }
 
-/// One record's loops, drawn with this force.
+/// One record's loops with this force.
 fn of_record(found: &LoopAnalysis, force: Force) -> Hysteresis {
     Hysteresis {
         force,

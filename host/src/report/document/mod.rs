@@ -1,4 +1,4 @@
-//! The document made of the findings: every number and sentence of `results.json` in its place.
+//! Builds the document from the findings: every number and sentence of `results.json`.
 
 mod answer_from_findings;
 mod compared_from_results;
@@ -13,7 +13,7 @@ use super::words::{check_sentences, missing_sentences, side_by_side};
 use crate::analyse::Findings;
 use crate::results::{Results, VERSION};
 
-/// `results.json`, from all that was found.
+/// Builds `results.json` from all findings.
 pub fn document(found: Findings) -> Results {
     let source = source_from_findings::source(&found);
     let checks = check_sentences::all(&found);
@@ -50,7 +50,7 @@ pub fn document(found: Findings) -> Results {
         }
         results.usable_bands.extend(measured.usable_band);
         results.frfs.extend(measured.frfs);
-        // the assembly comes last, and counts
+        // the assembly comes last and takes precedence
         results.noise_floor = measured.noise_floor.or(results.noise_floor);
     }
     if let Some(contact) = found.contact {

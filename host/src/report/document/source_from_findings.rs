@@ -1,10 +1,10 @@
-//! Where the results come from: the file's own words, and what the analysis did with its records.
+//! Provenance of the results: the information in the file, and how the analysis used its records.
 
 use crate::analyse::Findings;
 use crate::results::{Source, ranges};
 use serde_json::{Map, json};
 
-/// The findings' source with the settings of the analysis and the records used.
+/// The source in the findings, with the settings of the analysis and the records used.
 pub fn source(found: &Findings) -> Source {
     let mut source = found.source.clone();
     let settings = &mut source.settings;

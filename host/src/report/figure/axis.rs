@@ -1,41 +1,41 @@
-//! One axis of a panel: what stands on it, in which unit, from where to where.
+//! One axis of a panel: its quantity, unit and range.
 
 use serde::Serialize;
 
-/// How values are spread over an axis.
+/// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Spread {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By their logarithm; both ends must be positive.
+    /// Logarithmic; both ends must be positive.
     Log,
 }
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
-    /// What is shown along it.
+    /// Quantity shown along it.
     pub quantity: String,
     /// Its unit; empty for a plain number.
     pub unit: &'static str,
-    /// How values are spread.
+    /// Scale.
     pub scale: Spread,
-    /// From where to where it goes as a whole.
+    /// Full range.
     pub range: [f64; 2],
-    /// Ticks at the multiples of this, as for degrees.
+    /// Ticks at multiples of this, e.g. for degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every: Option<f64>,
     /// Axes with the same link are zoomed together.
     #[serde(skip_serializing_if = "str::is_empty")]
     pub link: &'static str,
-    /// Names instead of numbers, at 0, 1, 2 …; those of an upright axis start at the top.
+    /// Names instead of numbers, at 0, 1, 2 …; on a vertical axis they start at the top.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
 }
 
 impl Axis {
-    /// An even axis.
+    /// A linear axis.
     pub fn linear(quantity: impl Into<String>, unit: &'static str, range: [f64; 2]) -> Self {
         Axis {
             quantity: quantity.into(),
@@ -53,30 +53,30 @@ impl Axis {
         Axis { scale: Spread::Log, ..Axis::linear(quantity, unit, range) }
     }
 
-    /// Frequencies, Hz, zoomed with all others of the page.
+    /// Frequencies, Hz, zoomed together with all other frequency axes of the page.
     pub fn frequency(scale: Spread, range: [f64; 2]) -> Self {
         Axis { scale, link: "frequency", ..Axis::linear("frequency", "Hz", range) }
     }
 
-    /// Names in a row.
+    /// An axis of names.
     pub fn named(quantity: impl Into<String>, names: Vec<String>) -> Self {
         let range = [-0.5, names.len() as f64 - 0.5];
         Axis { names, ..Axis::linear(quantity, "", range) }
     }
 
-    /// The same with ticks at the multiples of `every`.
+    /// The same axis with ticks at multiples of `every`.
     #[must_use]
     pub fn every(self, every: f64) -> Self {
         Axis { every: Some(every), ..self }
     }
 
-    /// The same, zoomed with others of this link.
+    /// The same axis, zoomed together with others of this link.
     #[must_use]
     pub fn linked(self, link: &'static str) -> Self {
         Axis { link, ..self }
     }
 
-    /// What is written along it.
+    /// The axis label.
     pub fn label(&self) -> String {
         if self.unit.is_empty() { self.quantity.clone() } else { format!("{}, {}", self.quantity, self.unit) }
     }

@@ -1,4 +1,4 @@
-//! What stands in a panel: curves, points, bands, words.
+//! The contents of a panel: curves, points, bands, words.
 
 use super::origin::{How, Origin, Second};
 use super::packed::Packed;
@@ -9,38 +9,38 @@ use serde::Serialize;
 /// One mark.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
-    /// Its shape and numbers.
+    /// Its shape and values.
     #[serde(flatten)]
     pub shape: Shape,
-    /// What it stands for.
+    /// What it represents.
     pub role: Role,
-    /// Its name in the legend; without one it is part of the picture.
+    /// Its name in the legend; a mark without a name is not listed there.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// Where its numbers stand in `results.json`.
+    /// Where its numbers are in `results.json`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub origin: Vec<Origin>,
 }
 
-/// Where the points of a curve lie along the horizontal axis.
+/// Positions of a curve's points along the horizontal axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Along {
-    /// At regular steps.
+    /// At a constant step.
     Regular {
-        /// The first.
+        /// The first position.
         first: f64,
-        /// From one to the next.
+        /// The step.
         step: f64,
-        /// How many.
+        /// Number of points.
         count: usize,
     },
-    /// Anywhere.
+    /// At arbitrary positions.
     List(Packed),
 }
 
 impl Along {
-    /// Where point `i` lies.
+    /// Position of point `i`.
     pub fn at(&self, i: usize) -> f64 {
         match self {
             Along::Regular { first, step, .. } => first + step * i as f64,
@@ -48,7 +48,7 @@ impl Along {
         }
     }
 
-    /// How many points there are.
+    /// Number of points.
     pub fn len(&self) -> usize {
         match self {
             Along::Regular { count, .. } => *count,
@@ -61,7 +61,7 @@ impl Along {
         self.len() == 0
     }
 
-    /// Of equidistant values as regular steps, of others as they are.
+    /// Equidistant values become regular steps, others a list.
     pub fn of(values: &[f64]) -> Self {
         if let [first, second, ..] = values {
             let step = second - first;
@@ -77,10 +77,10 @@ impl Along {
     }
 }
 
-/// From where to where the bars of points go.
+/// Ends of the error bars of points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bars {
-    /// `x` or `y`: the axis they lie along.
+    /// `x` or `y`: the axis along which they are drawn.
     pub along: &'static str,
     /// Their lower ends.
     pub low: Packed,
@@ -88,26 +88,26 @@ pub struct Bars {
     pub high: Packed,
 }
 
-/// The sign of a point.
+/// The marker of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Marker {
-    /// A full round one.
+    /// A filled dot.
     #[default]
     Dot,
     /// A ring.
     Ring,
-    /// A full square.
+    /// A filled square.
     Square,
     /// An empty square.
     Frame,
-    /// An upright stroke.
+    /// A vertical stroke.
     Stroke,
-    /// A lying cross: not to be believed.
+    /// A diagonal cross: not to be believed.
     Cross,
 }
 
-/// How a mark is drawn, as its entry in a legend shows it.
+/// How a mark is drawn in a legend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drawn {
     /// As a line.
@@ -124,89 +124,93 @@ pub enum Drawn {
 pub enum Shape {
     /// A curve; `y` breaks where it is NaN.
     Line {
-        /// Where its points lie.
+        /// Positions of its points.
         x: Along,
         /// Its values.
         y: Packed,
     },
     /// The area between two curves.
     Ribbon {
-        /// Where their points lie.
+        /// Positions of the points.
         x: Along,
-        /// The lower one.
+        /// The lower curve.
         low: Packed,
-        /// The upper one.
+        /// The upper curve.
         high: Packed,
     },
-    /// Single points, with bars or without.
+    /// Single points, with or without error bars.
     Points {
-        /// Where they lie.
+        /// Their positions.
         x: Packed,
         /// Their values.
         y: Packed,
-        /// How far they may be off.
+        /// Their error bars.
         #[serde(skip_serializing_if = "Option::is_none")]
         bars: Option<Bars>,
-        /// How far aside they are drawn, px, so that points of the same place are seen beside one another.
+        /// Horizontal offset at which they are drawn, px, so that points at the same place are
+        /// visible side by side.
         #[serde(skip_serializing_if = "is_zero")]
         aside: f64,
-        /// Their sign.
+        /// Their marker.
         marker: Marker,
-        /// What is said of each when it is touched.
+        /// Tooltip of each point.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         says: Vec<String>,
     },
-    /// A curve whose x goes to and fro.
+    /// A curve whose x is not monotonic.
     Loop {
-        /// Horizontal.
+        /// Horizontal values.
         x: Packed,
-        /// Upright.
+        /// Vertical values.
         y: Packed,
     },
-    /// A straight line across: `at` on the upright axis, between two places of the horizontal one (all of it without).
+    /// A horizontal line at `at` on the vertical axis, between two positions on the horizontal axis
+    /// (over all of it if absent).
     Level {
-        /// The height.
+        /// The vertical position.
         at: f64,
-        /// From where to where.
+        /// The two positions.
         #[serde(skip_serializing_if = "Option::is_none")]
         between: Option<[f64; 2]>,
     },
-    /// A straight line upwards at this place of the horizontal axis.
+    /// A vertical line at this position on the horizontal axis.
     Upright {
-        /// The place.
+        /// The position.
         at: f64,
     },
-    /// A part of the horizontal axis.
+    /// A shaded part of the horizontal axis.
     Shade {
-        /// From where to where.
+        /// Its ends.
         between: [f64; 2],
     },
-    /// A ring around one place, with a word beside it.
+    /// A ring around one position, with a word next to it.
     Ring {
-        /// The place.
+        /// The position.
         at: [f64; 2],
         /// The word.
         text: String,
     },
-    /// A word at one place.
+    /// A word at one position.
     Text {
-        /// The place.
+        /// The position.
         at: [f64; 2],
         /// The word.
         text: String,
     },
-    /// Squares, one for each pair of names of the axes: 0…1, row by row; NaN where there is none.
+    /// Squares, one for each pair of names of the axes: 0…1, row by row; NaN where there is no
+    /// value.
     Cells {
         /// The values.
         values: Packed,
-        /// What is said of each when it is touched.
+        /// Tooltip of each square.
         says: Vec<String>,
     },
-    /// One strip for each row of the upright axis, 0…1 along the horizontal one: drawn where it is low.
+    /// One strip for each row of the vertical axis, with values 0…1 along the horizontal axis:
+    /// drawn where the value is low.
     Strips {
-        /// Where the values lie.
+        /// Positions of the values.
         x: Packed,
-        /// Row by row; NaN where there is none.
+        /// Values, row by row; NaN where there is none.
         values: Packed,
         /// The rows' names.
         says: Vec<String>,
@@ -221,7 +225,7 @@ fn is_zero(value: &f64) -> bool {
 }
 
 impl Shape {
-    /// How it looks in a legend.
+    /// How it is drawn in a legend.
     pub fn drawn(&self) -> Drawn {
         match self {
             Shape::Points { marker, .. } => Drawn::Points(*marker),
@@ -244,7 +248,7 @@ impl Mark {
         Mark::new(role, Shape::Line { x, y: Packed::of(y) })
     }
 
-    /// A curve whose x goes to and fro.
+    /// A curve whose x is not monotonic.
     pub fn looped(role: Role, x: impl IntoIterator<Item = f64>, y: impl IntoIterator<Item = f64>) -> Self {
         Mark::new(role, Shape::Loop { x: Packed::of(x), y: Packed::of(y) })
     }
@@ -263,7 +267,7 @@ impl Mark {
         Mark::new(role, shape)
     }
 
-    /// The same points with bars along `x` or `y`; other marks stay as they are.
+    /// The same points with error bars along `x` or `y`; other marks are unchanged.
     #[must_use]
     pub fn barred(mut self, along: &'static str, ends: impl IntoIterator<Item = [f64; 2]>) -> Self {
         if let Shape::Points { bars, .. } = &mut self.shape {
@@ -273,7 +277,7 @@ impl Mark {
         self
     }
 
-    /// The same points, drawn this far aside, px; other marks stay as they are.
+    /// The same points, drawn at this horizontal offset, px; other marks are unchanged.
     #[must_use]
     pub fn aside(mut self, px: f64) -> Self {
         if let Shape::Points { aside, .. } = &mut self.shape {
@@ -282,7 +286,7 @@ impl Mark {
         self
     }
 
-    /// The same points, each with what is said of it; other marks stay as they are.
+    /// The same points, each with a tooltip; other marks are unchanged.
     #[must_use]
     pub fn saying(mut self, words: Vec<String>) -> Self {
         if let Shape::Points { says, .. } = &mut self.shape {
@@ -291,12 +295,12 @@ impl Mark {
         self
     }
 
-    /// A part of the horizontal axis.
+    /// A shaded part of the horizontal axis.
     pub fn shade(role: Role, between: impl Into<[f64; 2]>) -> Self {
         Mark::new(role, Shape::Shade { between: between.into() })
     }
 
-    /// A straight line across.
+    /// A horizontal line.
     pub fn level(role: Role, at: f64) -> Self {
         Mark::new(role, Shape::Level { at, between: None })
     }
@@ -307,14 +311,15 @@ impl Mark {
         Mark { name: name.into(), ..self }
     }
 
-    /// The same, whose list `of` stands at `path` of `results.json` and was multiplied by `factor`.
+    /// Records that the mark's list `of` is at `path` in `results.json`, and was multiplied by
+    /// `factor`.
     #[must_use]
     pub fn from(mut self, of: &'static str, path: impl Into<String>, factor: f64) -> Self {
         self.origin.push(Origin { of, path: path.into(), factor, with: None });
         self
     }
 
-    /// The same, whose list `of` was made of the numbers at two paths.
+    /// Records that the mark's list `of` was computed from the numbers at two paths.
     #[must_use]
     pub fn from_two(
         mut self,
@@ -329,7 +334,8 @@ impl Mark {
         self
     }
 
-    /// The same points, whose values stand at `path` and the ends of whose bars in `ci95` beside it.
+    /// The same points, whose values are at `path` and the ends of whose bars are in `ci95` next to
+    /// it.
     #[must_use]
     pub fn estimate(self, of: &'static str, path: &str, factor: f64) -> Self {
         let beside = beside(path);
@@ -340,7 +346,7 @@ impl Mark {
         )
     }
 
-    /// The same points, whose values stand at `path`, and whose bars reach as far as `std` beside it.
+    /// The same points, whose values are at `path`, with bars of ± the `std` next to it.
     #[must_use]
     pub fn scatter(self, of: &'static str, path: &str, factor: f64) -> Self {
         let std = format!("{}/std", beside(path));
@@ -353,13 +359,13 @@ impl Mark {
         )
     }
 
-    /// Whether it is said where this list stands.
+    /// Whether the origin of this list is recorded.
     pub fn tells(&self, of: &str) -> bool {
         self.origin.iter().any(|origin| origin.of == of)
     }
 }
 
-/// The path of what a number stands in.
+/// The path of the object that contains a number.
 fn beside(path: &str) -> &str {
     path.rsplit_once('/').map_or(path, |(above, _)| above)
 }

@@ -1,7 +1,9 @@
-//! A figure as a description: what is shown, never how. Renderers make SVG, CSV, PNG and the page's live charts of it.
+//! A figure as a description of its content, independent of how it is drawn. Renderers turn it into
+//! SVG, CSV, PNG and the page's live charts.
 //!
-//! There are no pixels and no colours here: a [`Role`] says what a mark stands for, and [`role`] alone says how that looks.
-//! Curves are kept as 32-bit numbers, which hold the six significant digits of the curves of `results.json` exactly.
+//! It contains neither pixels nor colours: a [`Role`] states what a mark represents, and only
+//! [`role`] defines its appearance. Curves are stored as 32-bit numbers, which hold the six
+//! significant digits of the curves of `results.json` exactly.
 
 mod axis;
 mod mark;
@@ -23,27 +25,28 @@ use serde::Serialize;
 /// One figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
-    /// Its name: of its files and of its place in the page; small letters, digits, hyphens.
+    /// Its name, used for its files and its anchor in the page; lower-case letters, digits,
+    /// hyphens.
     pub name: &'static str,
     /// The figure of the paper that it corresponds to.
     #[serde(skip_serializing_if = "str::is_empty")]
     pub number: &'static str,
-    /// What it is called.
+    /// Its title.
     pub title: String,
-    /// What to see in it.
+    /// What it shows, in one or two sentences.
     pub say: String,
-    /// What it was made from.
+    /// Source of its data.
     pub from: Source,
-    /// Panels side by side; fewer where there is no room.
+    /// Number of panels side by side; fewer on a narrow page.
     pub columns: usize,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
 }
 
-/// What a figure was made from.
+/// Source of a figure's data.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Source {
-    /// Ids of the records, as closed ranges; empty where all of the campaign's are in it.
+    /// Ids of the records, as closed ranges; empty if it includes all of the campaign's records.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<[i64; 2]>,
     /// The campaign file.
@@ -54,39 +57,39 @@ pub struct Source {
     pub version: String,
 }
 
-/// How high a panel is beside the others.
+/// Height of a panel relative to the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Height {
-    /// For what is read closely.
+    /// For detailed reading.
     Tall,
-    /// As most are.
+    /// The default.
     #[default]
     Usual,
-    /// For what runs along beneath another panel.
+    /// For a panel that accompanies the one above.
     Low,
-    /// As wide as high.
+    /// Equal to the width.
     Square,
-    /// By the rows of a list of names on the upright axis.
+    /// Determined by the number of names on the vertical axis.
     Rows,
 }
 
 /// One plot of a figure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Panel {
-    /// What this panel shows, where the figure has several.
+    /// Title of this panel, if the figure has several.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub title: String,
-    /// Whether its names stand in the legend of a panel above it.
+    /// Whether its names are listed in the legend of a panel above it.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub named_above: bool,
-    /// How high it is.
+    /// Height.
     pub height: Height,
     /// The horizontal axis.
     pub x: Axis,
-    /// The upright axis.
+    /// The vertical axis.
     pub y: Axis,
-    /// What is drawn, the first at the bottom.
+    /// The marks, in drawing order: the first at the bottom.
     pub marks: Vec<Mark>,
 }
 
@@ -96,39 +99,39 @@ impl Panel {
         Panel { title: String::new(), named_above: false, height: Height::Usual, x, y, marks: Vec::new() }
     }
 
-    /// The same with this title.
+    /// The same panel with this title.
     #[must_use]
     pub fn titled(self, title: impl Into<String>) -> Self {
         Panel { title: title.into(), ..self }
     }
 
-    /// The same, this high.
+    /// The same panel with this height.
     #[must_use]
     pub fn high(self, height: Height) -> Self {
         Panel { height, ..self }
     }
 
-    /// The same, whose names stand in the legend of a panel above it.
+    /// The same panel, with its names listed in the legend of a panel above it.
     #[must_use]
     pub fn named_above(self) -> Self {
         Panel { named_above: true, ..self }
     }
 
-    /// The same with one more mark.
+    /// The same panel with one more mark.
     #[must_use]
     pub fn with(mut self, mark: Mark) -> Self {
         self.marks.push(mark);
         self
     }
 
-    /// The same with more marks.
+    /// The same panel with more marks.
     #[must_use]
     pub fn with_all(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
         self.marks.extend(marks);
         self
     }
 
-    /// Names and looks for its legend, each once, in the order drawn.
+    /// Names and appearance of its legend entries, without duplicates, in drawing order.
     pub fn legend(&self) -> Vec<(&str, Role, Drawn)> {
         let mut entries: Vec<(&str, Role, Drawn)> = Vec::new();
         for mark in self.marks.iter().filter(|mark| !mark.name.is_empty() && !self.named_above) {
@@ -141,7 +144,7 @@ impl Panel {
 }
 
 impl Figure {
-    /// An empty figure about results from `from`.
+    /// An empty figure of results from `from`.
     pub fn new(
         name: &'static str,
         number: &'static str,
@@ -159,27 +162,27 @@ impl Figure {
         }
     }
 
-    /// The same with this many panels side by side.
+    /// The same figure with this many panels side by side.
     #[must_use]
     pub fn across(self, columns: usize) -> Self {
         Figure { columns, ..self }
     }
 
-    /// The same with one more panel.
+    /// The same figure with one more panel.
     #[must_use]
     pub fn with(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
 
-    /// The same, made from these records.
+    /// The same figure, marked as made from these records.
     #[must_use]
     pub fn of_records(mut self, records: Vec<[i64; 2]>) -> Self {
         self.from.records = records;
         self
     }
 
-    /// Its name with the number of the paper's figure.
+    /// Its title with the number of the paper's figure.
     pub fn heading(&self) -> String {
         if self.number.is_empty() {
             self.title.clone()

@@ -4,17 +4,17 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use serde::{Serialize, Serializer};
 
-/// The values of a curve; one that is not known is NaN.
+/// The values of a curve; NaN where unknown.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Packed(pub Vec<f32>);
 
 impl Packed {
-    /// From numbers of any kind of list.
+    /// From any sequence of numbers.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         Packed(values.into_iter().map(|v| v as f32).collect())
     }
 
-    /// The finite values' range.
+    /// The range of the finite values.
     pub fn range(&self) -> Option<[f64; 2]> {
         let finite = || self.0.iter().copied().filter(|v| v.is_finite());
         let low = finite().reduce(f32::min)?;
@@ -29,7 +29,8 @@ impl Serialize for Packed {
     }
 }
 
-/// A number with six significant digits, as csv files and readouts show it; empty when it is none.
+/// A number with six significant digits, as used in csv files and readouts; empty if it is not
+/// finite.
 pub fn six_digits(value: f64) -> String {
     if !value.is_finite() {
         return String::new();

@@ -1,39 +1,41 @@
-//! What marks stand for, and how each role looks: in light and dark, in report, files and dashboard.
+//! What marks represent, and the appearance of each role: light and dark, in report, files and
+//! dashboard.
 //!
-//! Colours after Okabe and Ito, which stay apart for colour-blind readers; neighbours differ in lightness and dash too, so that grey
-//! print holds. Contrast against the paper is at least 3 : 1 in both lights, which a test measures.
+//! Colours follow Okabe and Ito, so that colour-blind readers can distinguish them; neighbouring
+//! roles also differ in lightness and dash, so that they remain distinct in grey print. The
+//! contrast with the background is at least 3 : 1 in light and dark, which a test verifies.
 
 use serde::Serialize;
 use std::fmt::Write;
 
 macro_rules! roles {
     ($($(#[$about:meta])* $role:ident = $name:literal $light:literal $dark:literal $dash:literal $width:literal;)*) => {
-        /// What a mark stands for.
+        /// What a mark represents.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
         pub enum Role {
             $($(#[$about])* #[serde(rename = $name)] $role,)*
         }
 
-        /// Every role.
+        /// All roles.
         pub const ALL: &[Role] = &[$(Role::$role),*];
 
         impl Role {
-            /// Its name in css classes and in JSON.
+            /// Its name in CSS classes and in JSON.
             pub const fn name(self) -> &'static str {
                 match self { $(Role::$role => $name),* }
             }
 
-            /// Its colour on light paper.
+            /// Its colour on a light background.
             pub const fn light(self) -> &'static str {
                 match self { $(Role::$role => $light),* }
             }
 
-            /// Its colour on dark paper.
+            /// Its colour on a dark background.
             pub const fn dark(self) -> &'static str {
                 match self { $(Role::$role => $dark),* }
             }
 
-            /// Its dash pattern; empty for a full line.
+            /// Its dash pattern; empty for a solid line.
             pub const fn dash(self) -> &'static str {
                 match self { $(Role::$role => $dash),* }
             }
@@ -59,61 +61,61 @@ roles! {
     Relative = "relative" "#00805d" "#2fc79a" "" 1.4;
     /// The force through the contact.
     Force = "force" "#333333" "#dddddd" "" 1.2;
-    /// An estimate between the arms.
+    /// An estimate of the stiffness between the arms.
     BetweenArms = "between-arms" "#0072b2" "#56b4e9" "" 2.0;
     /// The answer: the contact's own stiffness.
     Answer = "answer" "#00704f" "#2fc79a" "" 3.0;
     /// Clamps in series with the contact.
     Clamp = "clamp" "#8a6100" "#e6b84c" "" 2.0;
-    /// What a loop or a level gives.
+    /// Results of loops or levels.
     Loops = "loops" "#c24e00" "#ff9d5c" "" 2.0;
-    /// What an ideal measurement of a simulated rig would find.
+    /// True values of a simulated rig, as an ideal measurement would find.
     Truth = "truth" "#7a2e8e" "#d69be6" "4 3" 1.8;
     /// Two interface deformation modes.
     Modes2 = "modes-2" "#00805d" "#2fc79a" "2 2" 1.1;
-    /// Four.
+    /// Four interface deformation modes.
     Modes4 = "modes-4" "#c24e00" "#ff9d5c" "6 3" 1.1;
-    /// Six.
+    /// Six interface deformation modes.
     Modes6 = "modes-6" "#0072b2" "#56b4e9" "" 1.4;
-    /// What was measured.
+    /// Measured data.
     Measured = "measured" "#333333" "#dddddd" "" 1.1;
-    /// A model's curve through it.
+    /// A model's curve fitted to it.
     Fitted = "fitted" "#c24e00" "#ff9d5c" "7 4" 1.8;
     /// Noise.
     Noise = "noise" "#6b6b6b" "#a0a0a0" "3 3" 1.0;
-    /// What is not believed or was refused.
+    /// Data that are not credible or were refused.
     Refused = "refused" "#b0392b" "#ff8f80" "" 1.2;
     /// The first of several groups.
     Group1 = "group-1" "#0072b2" "#56b4e9" "" 1.2;
-    /// The second.
+    /// The second group.
     Group2 = "group-2" "#c24e00" "#ff9d5c" "6 3" 1.2;
-    /// The third.
+    /// The third group.
     Group3 = "group-3" "#00805d" "#2fc79a" "2 2" 1.2;
-    /// The fourth.
+    /// The fourth group.
     Group4 = "group-4" "#a8488a" "#e39ac4" "8 3 2 3" 1.2;
-    /// The fifth.
+    /// The fifth group.
     Group5 = "group-5" "#806600" "#e6b84c" "4 4" 1.2;
-    /// The sixth and all further ones.
+    /// The sixth and all further groups.
     Group6 = "group-6" "#333333" "#dddddd" "1 3" 1.2;
-    /// The band that numbers are read from.
+    /// The band over which results are quoted.
     Band = "band" "#b98900" "#e6b84c" "" 1.0;
-    /// Where the hammer put too little force.
+    /// Where the hammer's force is too low.
     Unusable = "unusable" "#777777" "#9a9a9a" "" 1.0;
-    /// Where hammer and vibrometer go next.
+    /// The next positions of hammer and vibrometer.
     Next = "next" "#b0005e" "#ff7ab8" "" 2.4;
-    /// A line to guide the eye.
+    /// A guide line.
     Guide = "guide" "#777777" "#9a9a9a" "3 3" 1.0;
 }
 
 impl Role {
-    /// One for each of several groups.
+    /// The role for one of several groups.
     pub fn group(index: usize) -> Role {
         const GROUPS: [Role; 6] =
             [Role::Group1, Role::Group2, Role::Group3, Role::Group4, Role::Group5, Role::Group6];
         GROUPS[index.min(GROUPS.len() - 1)]
     }
 
-    /// That of a set of interface deformation modes.
+    /// The role for a set of interface deformation modes.
     pub fn modes(count: usize) -> Role {
         match count {
             2 => Role::Modes2,
@@ -122,7 +124,7 @@ impl Role {
         }
     }
 
-    /// How much of the paper an area of this role covers, 0…1.
+    /// Opacity of an area of this role, 0…1.
     pub fn opacity(self) -> f64 {
         match self {
             Role::Band => 0.16,
@@ -132,10 +134,10 @@ impl Role {
     }
 }
 
-/// The paper in light and dark.
+/// Background colour, light and dark.
 pub const PAPER: [&str; 2] = ["#ffffff", "#16181b"];
 
-/// The roles as css: `--r-NAME` in light; in dark within `dark`.
+/// The roles as CSS variables `--r-NAME`, with the dark colours if `dark`.
 pub fn variables(dark: bool) -> String {
     let mut css = String::new();
     for role in ALL {
@@ -145,7 +147,7 @@ pub fn variables(dark: bool) -> String {
     css
 }
 
-/// Classes that draw with the variables: `s-NAME` strokes, `f-NAME` fills.
+/// CSS classes that use the variables: `s-NAME` strokes, `f-NAME` fills.
 pub fn classes() -> String {
     let mut css = String::new();
     for role in ALL {
@@ -155,7 +157,7 @@ pub fn classes() -> String {
     css
 }
 
-/// The same with the colours for light paper in place, for files that stand alone.
+/// The same classes with the colours for a light background written out, for standalone files.
 pub fn plain_classes() -> String {
     let mut css = String::new();
     for role in ALL {

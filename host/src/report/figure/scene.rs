@@ -1,37 +1,38 @@
-//! Places in space: where hammer and vibrometer go on the two arms.
+//! Positions in space: where hammer and vibrometer are placed on the two arms.
 
 use serde::Serialize;
 
-/// What a scene holds. Lengths in m; x lateral, y vertical, z horizontal along the sliding direction.
+/// Contents of a scene. Lengths in m; x lateral, y vertical, z horizontal along the sliding
+/// direction.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Scene {
-    /// Boxes, as a hint of the bodies.
+    /// Boxes that outline the bodies.
     pub bodies: Vec<Body>,
-    /// Places.
+    /// Positions.
     pub spots: Vec<Spot>,
 }
 
 /// A box.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Body {
-    /// What it stands for.
+    /// What it represents.
     pub role: super::Role,
     /// One corner, m.
     pub low: [f64; 3],
-    /// The opposite one, m.
+    /// The opposite corner, m.
     pub high: [f64; 3],
 }
 
-/// A place.
+/// A position.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spot {
     /// Its name.
     pub name: String,
-    /// What it stands for.
+    /// What it represents.
     pub role: super::Role,
-    /// Where, m.
+    /// The position, m.
     pub at: [f64; 3],
-    /// The hammer's direction; a response without.
+    /// The hammer's direction; absent for a response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub toward: Option<[f64; 3]>,
 }

@@ -1,9 +1,11 @@
-//! Curves cut to what their panel can show: nothing beyond the whole of an axis is ever seen.
+//! Trims curves to what their panel can show, since nothing beyond the full range of an axis is
+//! visible.
 
 use super::{Along, Mark, Packed, Panel, Shape};
 
 impl Panel {
-    /// The same without the points of curves that lie beyond the horizontal axis; one on each side stays, so that lines reach the frame.
+    /// Removes the points of curves that lie beyond the horizontal axis; one point on each side is
+    /// kept, so that lines extend to the frame.
     pub fn trim(&mut self) {
         let range = self.x.range;
         for mark in &mut self.marks {

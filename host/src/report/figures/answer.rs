@@ -1,4 +1,5 @@
-//! The answer on one axis: the contact, the clamps, what lies between the arms, and what the loops see, with their intervals.
+//! The answer on one axis: the contact, the clamps, the stiffness between the arms, and that from
+//! loops, with their intervals.
 
 use super::{MICRO, below_name};
 use crate::contact::Interval;
@@ -12,24 +13,24 @@ struct Row {
     role: Role,
     mean: f64,
     ends: [f64; 2],
-    /// Whether it may be taken for what it is called.
+    /// Whether it is a valid estimate of the quantity that it is named after.
     believed: bool,
     truth: Option<f64>,
-    /// Where it stands.
+    /// Its path in `results.json`.
     path: String,
     ends_are: Ends,
 }
 
-/// What the ends of a row's bar are.
+/// Meaning of the ends of a row's bar.
 #[derive(Clone, Copy, PartialEq)]
 enum Ends {
     Interval,
     Scatter,
-    /// The smallest and the largest of all.
+    /// Minimum and maximum.
     Extremes,
 }
 
-/// A few estimates, the one to quote first.
+/// A few estimates, with the one to quote first.
 pub fn answer(results: &Results) -> Option<Figure> {
     let rows = rows(results);
     if rows.is_empty() {
@@ -141,7 +142,7 @@ fn headline(results: &Results) -> Option<Row> {
     })
 }
 
-/// The levels' straight loops from the softest to the stiffest.
+/// The range of the levels' straight loops from the softest to the stiffest.
 fn levels(results: &Results) -> Option<Row> {
     let straight = |h: &&Hysteresis| h.kind == Excitation::Shaker && h.force == Force::Raw;
     let slipping = |h: &Hysteresis| matches!(h.shape, Shape::Microslip | Shape::GrossSlip);
@@ -161,7 +162,7 @@ fn levels(results: &Results) -> Option<Row> {
         role: Role::Loops,
         mean: found[found.len() / 2],
         ends: [low, high],
-        // between the spots a specimen's tilt is in it
+        // between the measured points, a specimen's tilt is included
         believed: !campaign,
         truth: None,
         path: "/hysteresis/*/*/mean".into(),

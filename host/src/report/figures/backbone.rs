@@ -1,4 +1,4 @@
-//! A contact that slips, against amplitude: stiffness and tip force of the levels, and the law through them.
+//! A slipping contact against amplitude: stiffness and tip force of the levels, and the fitted law.
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Height, How, Mark, Marker, Packed, Panel, Role};
@@ -6,17 +6,18 @@ use crate::report::scale::middle_range;
 use crate::report::words::number::{decimals, micro, short};
 use crate::results::{Backbone, Force, Hysteresis, Results};
 
-/// Most laws in one figure.
+/// Maximum number of laws in one figure.
 const MOST: usize = 3;
 
-/// Where amplitudes and secants stand.
+/// Paths of amplitudes and secants.
 const AMPLITUDE: &str = "/hysteresis/*/amplitude_m";
 const SECANT: &str = "/hysteresis/*/k_secant_n_per_m";
 
-/// Points of a law's curve.
+/// Number of points of a law's curve.
 const POINTS: usize = 160;
 
-/// Left: slope of the stick part and peak secant of each level and the law's secant. Right: the force at the loops' tips and the law's backbone.
+/// Left: slope of the stick part and peak secant of each level, and the law's secant. Right: the
+/// force at the loops' tips, and the law's backbone.
 pub fn backbone(results: &Results) -> Option<Figure> {
     let shown = &results.backbones[..results.backbones.len().min(MOST)];
     let rows: Vec<Vec<&Hysteresis>> = shown.iter().map(|one| rows(results, one)).collect();

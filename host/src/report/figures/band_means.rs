@@ -30,7 +30,7 @@ struct Row {
     std: f64,
     ends: [f64; 2],
     identified: bool,
-    /// Where it stands among the joints, and its lines among the curves.
+    /// Its index among the joints, and that of its lines among the curves.
     places: [usize; 2],
 }
 

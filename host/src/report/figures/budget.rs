@@ -1,11 +1,11 @@
-//! What makes the interval of k_T, and whether k_T changes with frequency.
+//! Contributions to the interval of k_T, and whether k_T depends on frequency.
 
 use super::{MICRO, below_name};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Spread};
 use crate::report::words::number::{micro, short};
 use crate::results::Results;
 
-/// Left the causes of the uncertainty, right k_T bin by bin.
+/// Left: the causes of the uncertainty. Right: k_T bin by bin.
 pub fn budget(results: &Results) -> Option<Figure> {
     let contact = &results.answer.as_ref()?.contact;
     let mut causes: Vec<(&str, f64)> =

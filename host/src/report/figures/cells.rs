@@ -1,10 +1,10 @@
-//! The matrix of cells: what was kept of what was wanted.
+//! The matrix of cells: hits kept, compared with those planned.
 
 use crate::report::figure::{Axis, Figure, Height, How, Mark, Packed, Panel, Role, Shape};
 use crate::results::{CellRow, Results};
 use crate::structure::Structure;
 
-/// So many impacts have room in a third of the page.
+/// This many impacts fit into a third of the page.
 const FEW: usize = 5;
 
 /// `AJB: 192 cells`.
@@ -15,7 +15,7 @@ pub(super) fn counted(configuration: &str, cells: usize) -> String {
 /// One matrix for each configuration: responses down, impacts across.
 pub fn cells(results: &Results) -> Option<Figure> {
     let all = &results.cells.as_ref()?.cells;
-    // FRFs that were imported leave the plan's cells without hits, as they should
+    // with imported FRFs the plan's cells have no hits, which is no fault
     if all.iter().all(|c| c.kept == 0 && c.refused.values().all(|n| *n == 0)) {
         return None;
     }
@@ -44,7 +44,7 @@ pub fn cells(results: &Results) -> Option<Figure> {
         let values = found.iter().map(|c| c.map_or(f64::NAN, |c| c.kept as f64 / c.wanted.max(1) as f64));
         let shape = Shape::Cells {
             values: Packed::of(values),
-            // one for each place: the page finds them by it, holes or not
+            // one for every position, even without a cell, because the page looks them up by index
             says: found.iter().map(|c| c.map_or_else(String::new, |c| said(c))).collect(),
         };
         let panel = Panel::new(Axis::named("impact", impacts), Axis::named("response", responses))
@@ -59,7 +59,7 @@ pub fn cells(results: &Results) -> Option<Figure> {
             ));
         figure = figure.with(panel);
     }
-    // few cells need no squares as large as a hand
+    // a few cells do not need large squares
     let most = figure.panels.iter().map(|p| p.x.names.len()).max().unwrap_or(0);
     (!figure.panels.is_empty()).then(|| if most <= FEW { figure.across(3) } else { figure })
 }

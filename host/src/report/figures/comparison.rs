@@ -1,4 +1,4 @@
-//! All stiffness values of one sliding direction on one axis: what each method sees.
+//! All stiffness values in the sliding direction on one axis, by method.
 
 use super::{MICRO, below_name};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
@@ -17,13 +17,14 @@ struct Row {
     median_path: String,
 }
 
-/// Mean and scatter of k_z over the main band, by method: of those that identified it, or of all where none did.
+/// Mean and scatter of k_z over the main band, by method: of the methods that identified it, or of
+/// all if none did.
 pub fn comparison(results: &Results) -> Option<Figure> {
     let mut rows: Vec<Row> = quoted(results).into_iter().collect();
     let of_band = |j: &Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
     rows.extend(results.joint.iter().enumerate().filter(|(_, j)| of_band(j)).filter_map(|(i, j)| row(i, j)));
     let all = rows.len();
-    // methods that failed would stretch the axis and tell nothing: the table has them
+    // methods that failed would only stretch the axis; they are listed in the table
     if rows.iter().any(|row| row.believed) {
         rows.retain(|row| row.believed);
     }
@@ -34,7 +35,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     let high = rows.iter().map(|r| r.mean + r.std).fold(0.0, f64::max);
     let low = rows.iter().map(|r| r.mean).fold(0.0, f64::min);
     let range = [1.1 * low, 1.1 * high.max(-0.1 * low)];
-    // many rows stand in two columns on the same axis
+    // many rows are split into two columns with the same axis
     let per_panel = if rows.len() > TALLEST { rows.len().div_ceil(2) } else { rows.len() };
     let panels = rows.chunks(per_panel).map(|rows| panel(rows, range));
     let say = format!(
@@ -50,7 +51,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     Some(figure)
 }
 
-/// More rows than these are too many for one column.
+/// With more rows than this, a single column is too long.
 const TALLEST: usize = 10;
 
 fn panel(rows: &[Row], range: [f64; 2]) -> Panel {
@@ -96,7 +97,7 @@ fn row(index: usize, joint: &Joint) -> Option<Row> {
     })
 }
 
-/// The estimate to quote, which is no method's row.
+/// The estimate to quote, which is not a row of any method.
 fn quoted(results: &Results) -> Option<Row> {
     let estimate = results.quoted()?;
     let z = estimate.joint.get(&Dof::Z).filter(|z| z.identified)?;

@@ -1,10 +1,11 @@
-//! How well rigid motions of the virtual points hold what was measured, channel by channel and impact by impact.
+//! Fraction of the measurement that rigid motions of the virtual points reproduce, channel by
+//! channel and impact by impact.
 
 use crate::report::figure::{Axis, Figure, Mark, Marker, Panel, Role};
 use crate::results::{Results, VirtualPoint};
 use std::collections::BTreeMap;
 
-/// Sensors left, impacts right, of the largest set of modes.
+/// Sensors on the left, impacts on the right, for the largest set of modes.
 pub fn consistency(results: &Results) -> Option<Figure> {
     let most = results.virtual_points.iter().map(|p| p.idms).max()?;
     let shown: Vec<(usize, &VirtualPoint)> =

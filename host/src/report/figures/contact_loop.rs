@@ -1,4 +1,5 @@
-//! One impact at the contact: the time signals and the loop of the first cycle with its slope (the paper's Fig. 7).
+//! One impact at the contact: the time signals and the loop of the first cycle with its slope (the
+//! paper's Fig. 7).
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role};
@@ -6,7 +7,7 @@ use crate::report::scale::middle_range;
 use crate::report::words::number::{decimals, micro};
 use crate::results::{LoopCurve, Results};
 
-/// Where the time between samples stands.
+/// Path of the time between samples.
 const STEP: &str = "/example_loop/step_s";
 
 /// Δx, x_A, x_B and T over time; T against Δx.

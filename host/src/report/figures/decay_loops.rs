@@ -1,4 +1,5 @@
-//! Loops of the first, third and fourth cycle after one hit, on the same scales (the paper's Fig. 7).
+//! Loops of the first, third and fourth cycle after one hit, on the same scales (the paper's Fig.
+//! 7).
 
 use super::MICRO;
 use crate::report::figure::{Axis, Figure, Height, Mark, Panel, Role};
@@ -6,7 +7,7 @@ use crate::report::scale::middle_range;
 use crate::report::words::TURNED_DEG;
 use crate::results::Results;
 
-/// Those that the paper shows.
+/// The cycles that the paper shows.
 const SHOWN: [usize; 3] = [1, 3, 4];
 
 /// One panel for each cycle that the record has.

@@ -1,13 +1,14 @@
-//! A matrix of FRFs as it lies in a file or in memory.
+//! A matrix of FRFs from a file or from memory.
 
 use crate::frf::{Frf, MotionQuantity};
 use crate::report::figure::{Along, Axis, Figure, Mark, Panel, Role, Spread};
 use crate::report::scale::middle_range;
 
-/// More curves than this cannot be told apart.
+/// More curves than this cannot be distinguished.
 const MOST: usize = 6;
 
-/// Magnitude over frequency of the first pairs, inputs first; none with fewer than two lines above 0 Hz.
+/// Magnitude over frequency of the first pairs, inputs varying fastest; `None` with fewer than two
+/// lines above 0 Hz.
 pub fn frf_matrix(frf: &Frf) -> Option<Figure> {
     let pairs: Vec<(usize, usize)> =
         (0..frf.outputs().len()).flat_map(|o| (0..frf.inputs().len()).map(move |i| (o, i))).collect();
@@ -20,13 +21,13 @@ pub fn frf_matrix(frf: &Frf) -> Option<Figure> {
     }
     let curve = |(o, i): (usize, usize)| -> Vec<f64> {
         let magnitude = |line: &usize| frf.lines()[*line][(o, i)].norm();
-        // nothing lies at zero on a logarithmic axis
+        // zero cannot be shown on a logarithmic axis
         lines.iter().map(magnitude).map(|m| if m > 0.0 { m } else { f64::NAN }).collect()
     };
     let curves: Vec<Vec<f64>> = shown.iter().map(|pair| curve(*pair)).collect();
     let seen = curves.iter().flatten().filter(|m| m.is_finite()).map(|m| m.log10());
     let [low, high] = middle_range(seen, 0.998, 0.04)?;
-    // a flat curve needs some room too
+    // a flat curve needs a minimum height of the axis
     let [low, high] = if high - low < 0.1 { [low - 0.05, high + 0.05] } else { [low, high] };
     let unit = match frf.quantity() {
         MotionQuantity::Displacement => "m/N",

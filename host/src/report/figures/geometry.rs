@@ -1,17 +1,17 @@
-//! Where hammer and vibrometer went, in space (the paper's Fig. 4).
+//! Positions of hammer and vibrometer in space (the paper's Fig. 4).
 
 use crate::report::figure::{Axis, Body, Figure, Height, Mark, Panel, Role, Scene, Shape, Spot};
 use crate::results::{Place, Results};
 
-/// Room between the outermost places of an arm and the box that hints at it, m.
+/// Margin between the outermost positions of an arm and the box that outlines it, m.
 const ROOM_M: f64 = 0.004;
 
-/// Every place of the plan, and the arms as boxes around those that lie on their interfaces.
+/// Every position of the plan, and the arms as boxes around the positions on their interfaces.
 pub fn of_results(results: &Results) -> Option<Figure> {
     geometry(&results.geometry)
 }
 
-/// Of places alone.
+/// From positions only.
 pub fn geometry(places: &[Place]) -> Option<Figure> {
     if places.is_empty() {
         return None;

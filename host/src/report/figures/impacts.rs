@@ -1,4 +1,4 @@
-//! The slope that each impact gave, by where it was hit.
+//! The slope from each impact, by impact position.
 
 use super::MICRO;
 use crate::report::figure::{Axis, Figure, Mark, Marker, Panel, Role};

@@ -1,12 +1,13 @@
-//! The CMIF: singular values of what coupling changes, over frequency (the paper's Fig. B.15).
+//! The CMIF: singular values of the change caused by coupling, over frequency (the paper's Fig.
+//! B.15).
 
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Spread};
 use crate::results::{MAIN_BAND, Results};
 
-/// Below this part of the largest value there is rounding.
+/// Values below this fraction of the largest one are rounding errors.
 const FLOOR: f64 = 1e-8;
 
-/// The largest singular values; as many as modes were suggested are drawn stronger.
+/// The largest singular values; the suggested number of modes is drawn with thicker lines.
 pub fn interface_modes(results: &Results) -> Option<Figure> {
     let modes = results.interface_modes.as_ref()?;
     let frequencies = [*modes.frequency_hz.first()?, *modes.frequency_hz.last()?];

@@ -1,4 +1,5 @@
-//! k_z over frequency, one panel per method, one curve per IDM set, with the band that means are taken over (the paper's Fig. 10, A.11 to A.13).
+//! k_z over frequency, one panel per method, one curve per IDM set, with the band of the means (the
+//! paper's Fig. 10, A.11 to A.13).
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Height, How, Mark, Packed, Panel, Role, Shape, Spread};
@@ -8,7 +9,7 @@ use crate::report::words::number::{decimals, micro};
 use crate::results::{Joint, JointSpectrum, MAIN_BAND, Results, SpectrumCurve};
 use crate::substructuring::Band;
 
-/// Where the frequencies stand.
+/// Path of the frequencies.
 const LINES: &str = "/joint_spectrum/frequency_hz/*";
 
 /// Stiffness along z line by line.
@@ -123,8 +124,9 @@ fn shown_range(spectrum: &JointSpectrum, bands: &[Band]) -> Option<[f64; 2]> {
     Some([(low - room).max(first), (high + room).min(last)])
 }
 
-/// N/µm: the middle of what the richest set of modes shows in the main band by the methods that identified a stiffness there, and zero.
-/// (What failed may run off by hundreds; it must not flatten the curve that the headline quotes.)
+/// Range of the stiffness axis, N/µm: zero, and the middle range of the largest set of modes in the
+/// main band, from the methods that identified a stiffness there. (Methods that failed may be off
+/// by hundreds; they must not flatten the curve from which the headline is quoted.)
 fn shown_stiffness(
     results: &Results,
     spectrum: &JointSpectrum,

@@ -1,4 +1,5 @@
-//! The shaker's levels: stiffness against frequency and against amplitude, before and after the hammer's cells (the paper's Fig. 5).
+//! The shaker's levels: stiffness against frequency and against amplitude, before and after the
+//! hammer's cells (the paper's Fig. 5).
 
 use super::MICRO;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Spread};
@@ -7,28 +8,29 @@ use crate::report::words;
 use crate::report::words::number::{decimals, micro, short};
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results};
 
-/// One level, ready to be drawn.
+/// One level, ready for plotting.
 struct Dot {
     frequency_hz: f64,
     micrometres: f64,
     mean: f64,
     std: f64,
-    /// Whether it is the slope of a straight loop; k_eq otherwise.
+    /// Whether the value is the slope of a straight loop; otherwise it is k_eq.
     straight: bool,
     after: bool,
 }
 
-/// How far apart points of the same place are drawn, px: about their own width.
+/// Offset between points at the same place, px: about their own width.
 const SIDE: f64 = 8.0;
 
-/// Where stiffnesses stand.
+/// Paths of the stiffnesses.
 const SLOPE: &str = "/hysteresis/*/slope_between_spots_n_per_m/mean";
 const WHOLE: &str = "/hysteresis/*/k_eq_n_per_m/mean";
 
-/// As many groups as have roles that can be told apart.
+/// The number of groups is limited to that of the distinct roles.
 const MOST: usize = 6;
 
-/// Left: against frequency, a role for each amplitude. Right: against amplitude, a role for each frequency.
+/// Left: against frequency, with one role per amplitude. Right: against amplitude, with one role
+/// per frequency.
 pub fn levels(results: &Results) -> Option<Figure> {
     let dots: Vec<Dot> = results.hysteresis.iter().filter_map(dot).collect();
     if dots.len() < 2 {
@@ -68,7 +70,7 @@ fn axis(
         return Some(Axis { scale: Spread::Log, ..Axis::linear(quantity, unit, range) });
     }
     let [low, high] = middle_range(values, 1.0, 0.12)?;
-    // a single place stands in the middle
+    // a single value is placed in the middle
     let [low, high] = if high > low { [low, high] } else { [0.8 * low, 1.2 * high] };
     Some(Axis::linear(quantity, unit, [low.max(0.0), high]))
 }
@@ -145,7 +147,8 @@ fn dot(row: &Hysteresis) -> Option<Dot> {
     })
 }
 
-/// The distinct values, those within a part of one another as one (their first).
+/// The distinct values; values that differ by less than `part` of each other count as one (the
+/// first of them).
 fn distinct(dots: &[Dot], of: impl Fn(&Dot) -> f64, part: f64) -> Vec<f64> {
     let mut values: Vec<f64> = dots.iter().map(of).collect();
     values.sort_by(f64::total_cmp);

@@ -7,7 +7,7 @@ use crate::report::words;
 use crate::report::words::number::{micro, short};
 use crate::results::{Results, ShakerLoop, Shape};
 
-/// The loop that shows most: one that slips if there is one, else the widest.
+/// The most informative loop: one that slips if there is any, otherwise the widest.
 pub fn loop_parts(results: &Results) -> Option<Figure> {
     let (index, shown) = results.shaker_loops.iter().enumerate().max_by(|(_, a), (_, b)| {
         let swing = |l: &ShakerLoop| l.displacement_m.iter().fold(0.0f64, |m, v| m.max(v.abs()));

@@ -1,6 +1,7 @@
-//! The figures, one file each: results in, a description out, or nothing when the results lack the data.
+//! The figures, one file each. Each takes the results and returns a description, or `None` if the
+//! results lack the data.
 //!
-//! A new figure is one file and one line of [`ALL`].
+//! A new figure needs one file and one line of [`ALL`].
 
 mod answer;
 mod backbone;
@@ -40,13 +41,13 @@ use crate::results::Results;
 pub enum Chapter {
     /// The first screen.
     Answer,
-    /// What each measurement sees.
+    /// Comparison of all methods.
     SideBySide,
     /// The joint by substructuring.
     Joint,
     /// The contact by loops.
     Loops,
-    /// Where, how much and how well it was measured.
+    /// What was measured: positions, number and quality of the hits.
     Measured,
     /// Frequency response functions.
     Frfs,
@@ -55,13 +56,13 @@ pub enum Chapter {
 /// A figure of the report.
 #[derive(Clone, Copy)]
 pub struct Entry {
-    /// Where it stands.
+    /// Chapter in which it appears.
     pub chapter: Chapter,
-    /// What it is called where it cannot be drawn.
+    /// Title shown if it cannot be drawn.
     pub title: &'static str,
-    /// What it would need.
+    /// Data that it needs.
     pub needs: &'static str,
-    /// What makes it.
+    /// Function that makes it.
     pub make: fn(&Results) -> Option<Figure>,
 }
 
@@ -79,7 +80,7 @@ const LEVELS: &str = "levels of the shaker, measured by `jointrig shaker`";
 const CAMPAIGN: &str = "a campaign's own records";
 const ALL_THREE: &str = "FRFs of A, B and the assembly";
 
-/// Every figure, in the order of the report.
+/// All figures, in the order of the report.
 pub const ALL: &[Entry] = &[
     entry(Chapter::Answer, "The answer", "an identified stiffness", answer::answer),
     entry(Chapter::SideBySide, "Every method side by side", ALL_THREE, comparison::comparison),
@@ -129,7 +130,7 @@ pub const ALL: &[Entry] = &[
 ];
 
 impl Entry {
-    /// The figure of these results, with what it was made from.
+    /// The figure of these results, with the source of its data.
     pub fn of(&self, results: &Results) -> Option<Figure> {
         let mut figure = (self.make)(results)?;
         figure.panels.iter_mut().for_each(Panel::trim);
@@ -144,15 +145,15 @@ impl Entry {
     }
 }
 
-/// Every figure that these results have the data for.
+/// All figures for which these results have the data.
 pub fn all(results: &Results) -> Vec<Figure> {
     ALL.iter().filter_map(|entry| entry.of(results)).collect()
 }
 
-/// m to µm, N/m to N/µm the other way round.
+/// Converts m to µm; N/m are divided by it to give N/µm.
 const MICRO: f64 = 1e6;
 
-/// Where the sign of row `i` stands on an axis of rows: below its name.
+/// Vertical position of the marker of row `i` on an axis of rows: below its name.
 fn below_name(i: usize) -> f64 {
     i as f64 + 0.26
 }

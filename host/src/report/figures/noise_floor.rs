@@ -1,4 +1,4 @@
-//! An FRF against its own noise, and the dynamic stiffness that it gives (the paper's Fig. C.16).
+//! An FRF compared with its own noise, and the resulting dynamic stiffness (the paper's Fig. C.16).
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Mark, Panel, Role, Spread};

@@ -1,4 +1,5 @@
-//! Which motions take part in what coupling adds (beside the paper's Fig. B.15).
+//! Participation of rigid motions in the change caused by coupling (accompanies the paper's Fig.
+//! B.15).
 
 use crate::report::figure::{Axis, Figure, Mark, Packed, Panel, Role, Shape};
 use crate::results::Results;

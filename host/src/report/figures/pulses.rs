@@ -1,13 +1,13 @@
-//! The hammer over the campaign: peak force of every hit, and the coil's pulse that gave it.
+//! The hammer over the campaign: peak force of every hit, and the coil's pulse that produced it.
 
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role};
 use crate::report::scale::middle_range;
 use crate::results::{HitRow, Results};
 
-/// Force above, pulse below.
+/// Force at the top, pulse below.
 pub fn pulses(results: &Results) -> Option<Figure> {
     let hits = &results.hits;
-    // overloads and hits that met nothing are far away: the frame is that of the hits that were kept
+    // overloads and hits that missed would stretch the axis: its range is that of the kept hits
     let kept = hits.iter().filter(|h| h.kept || hits.iter().all(|h| !h.kept)).map(|h| h.peak_n);
     let force = middle_range(kept, 1.0, 0.06)?;
     let pulse = middle_range(hits.iter().map(|h| f64::from(h.pulse_us)), 1.0, 0.1)?;

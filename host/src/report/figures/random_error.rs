@@ -4,7 +4,7 @@ use crate::report::figure::{Axis, Figure, Mark, Marker, Panel, Role};
 use crate::results::Results;
 use crate::structure::Structure;
 
-/// Cells in the order of the plan, a role for each configuration.
+/// Cells in the order of the plan, with one role per configuration.
 pub fn random_error(results: &Results) -> Option<Figure> {
     let cells = &results.cells.as_ref()?.cells;
     let known: Vec<(usize, f64)> = cells

@@ -1,4 +1,5 @@
-//! The specimens' decay after one hit, and the same put together from two sinusoids (the paper's Fig. 9).
+//! The specimens' decay after one hit, and its reconstruction from two sinusoids (the paper's Fig.
+//! 9).
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Mark, Panel, Role};
@@ -6,7 +7,7 @@ use crate::report::scale::middle_range;
 use crate::report::words::number::{decimals, short};
 use crate::results::Results;
 
-/// Above specimen A, below specimen B.
+/// Specimen A at the top, specimen B below.
 pub fn rebuilt(results: &Results) -> Option<Figure> {
     let shown = results.reconstruction.as_ref()?;
     let (hidden, common) = (decimals(shown.hidden_hz, 0), decimals(shown.common_hz, 0));

@@ -5,10 +5,10 @@ use crate::report::scale::middle_range;
 use crate::results::{FrfCurve, MAIN_BAND, Results, Role as Shows};
 use crate::structure::Structure;
 
-/// Below this no hammer and no vibrometer tells anything, Hz.
+/// Below this frequency neither hammer nor vibrometer gives useful data, Hz.
 const LOWEST_HZ: f64 = 5.0;
 
-/// Driving point and transfer of every configuration that has them.
+/// Driving point and transfer FRF of every configuration that has them.
 pub fn receptances(results: &Results) -> Option<Figure> {
     let shown = |c: &&FrfCurve| matches!(c.role, Shows::DrivingPoint | Shows::Transfer);
     let indexed = || results.frfs.iter().enumerate().filter(|(_, c)| shown(c));
@@ -111,12 +111,12 @@ fn line(curve: &FrfCurve, index: usize, kind: Kind) -> Option<Mark> {
     (curve.magnitude_m_per_n.len() > 1).then(|| mark.named(format!("{} from {}", curve.output, curve.input)))
 }
 
-/// Where the lines of an FRF lie.
+/// Positions of the lines of an FRF.
 pub(super) fn along(curve: &FrfCurve, count: usize) -> Along {
     Along::Regular { first: curve.first_hz, step: curve.step_hz, count }
 }
 
-/// A curve with where its frequencies stand.
+/// Adds the origin of its frequencies to a curve.
 pub(super) fn placed(mark: Mark, index: usize) -> Mark {
     mark.from("first", format!("/frfs/{index}/first_hz"), 1.0).from(
         "step",
@@ -125,7 +125,7 @@ pub(super) fn placed(mark: Mark, index: usize) -> Mark {
     )
 }
 
-/// A gap wherever the phase jumps from one edge to the other, instead of a line across the whole frame.
+/// Inserts a gap where the phase wraps, instead of a line across the whole frame.
 pub(super) fn unbroken(degrees: &[f64]) -> Vec<f64> {
     let jumps = |i: usize| degrees.get(i + 1).is_some_and(|next| (next - degrees[i]).abs() > 180.0);
     (0..degrees.len()).map(|i| if jumps(i) { f64::NAN } else { degrees[i] }).collect()

@@ -1,4 +1,5 @@
-//! Loops of the shaker, T over Δx, and both specimens over the same cycle (the paper's Fig. 6), on the same scales.
+//! Loops of the shaker, T over Δx, and both specimens over the same cycle (the paper's Fig. 6),
+//! with the same axes.
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role};
@@ -7,7 +8,7 @@ use crate::report::words;
 use crate::report::words::number::{decimals, micro, short};
 use crate::results::{Results, ShakerLoop, Shape};
 
-/// The frequencies of the paper, Hz; those nearest to them are shown.
+/// The frequencies of the paper, Hz; the nearest ones are shown.
 const SHOWN_HZ: [f64; 3] = [100.0, 200.0, 250.0];
 
 /// Three loops with their time signals.

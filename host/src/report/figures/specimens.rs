@@ -1,4 +1,5 @@
-//! FRFs at the contact: the two specimens, their difference, the force, and the arms (the paper's Fig. 8).
+//! FRFs at the contact: the two specimens, their difference, the force, and the arms (the paper's
+//! Fig. 8).
 
 use super::receptances::{along, placed, unbroken};
 use crate::report::figure::{Axis, Figure, Height, Mark, Panel, Role, Shape, Spread};
@@ -16,7 +17,7 @@ const MOTIONS: [(Shows, Role, &str); 5] = [
     (Shows::ArmB, Role::ArmB, "arm B"),
 ];
 
-/// Magnitude and phase over the hammer's force, 100–400 Hz; T in a panel of its own.
+/// Magnitude and phase per hammer force, 100–400 Hz; T in a separate panel.
 pub fn specimens(results: &Results) -> Option<Figure> {
     let of = |role| results.frfs.iter().enumerate().find(|(_, c)| c.role == role && c.configuration == "AJB");
     of(Shows::SpecimenA).zip(of(Shows::SpecimenB))?;
@@ -82,7 +83,7 @@ fn phase_line(curve: &FrfCurve, index: usize, role: Role) -> Mark {
     )
 }
 
-/// What the curves reach within the frequencies shown.
+/// Range of the curves' magnitudes within the frequencies shown.
 fn magnitudes<'a>(curves: impl Iterator<Item = &'a FrfCurve>) -> Option<[f64; 2]> {
     let inside = curves.flat_map(|c| {
         let lines = c.magnitude_m_per_n.iter().enumerate();

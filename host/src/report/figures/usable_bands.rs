@@ -1,4 +1,4 @@
-//! Over which frequencies the hammer put enough force.
+//! Frequency ranges in which the hammer's force was sufficient.
 
 use super::below_name;
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Spread};

@@ -1,7 +1,8 @@
-// The CMIF under the cursor: which motions take part in a curve, and the arms that move so against one another.
+// The CMIF under the cursor: which motions take part in a curve, and the arms moving against one
+// another accordingly.
 const MOTIONS=['x','y','z','rx','ry','rz'];
 let participation;
-// how much each motion takes part in singular value i; nothing where that is not known
+// participation of each motion in singular value i; nothing if it is not known
 function partsOf(i){
   if(participation===undefined){
     const mark=FIGURES.find(f=>f.name==='participation')?.panels[0].marks.find(m=>m.cells);
@@ -28,7 +29,7 @@ let swinging=0;
 const scenes=()=>[...alive.values()].flat().filter(c=>c instanceof SceneView).concat(small||[]);
 let small;
 function moveArms(parts){
-  // the largest is shown as large as there is room
+  // the largest motion is scaled to the available space
   const most=parts&&Math.max(...parts),motion=most>0?parts.map(p=>p/most):undefined;
   for(const s of scenes())s.motion=motion;
   if(swinging||!parts||matchMedia('(prefers-reduced-motion: reduce)').matches){for(const s of scenes())s.redraw();return}

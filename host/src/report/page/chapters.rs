@@ -1,4 +1,5 @@
-//! The chapters, as in the paper: figures and tables, what is missing with what it would need, and where everything comes from.
+//! The chapters, in the order of the paper: figures and tables, missing figures with the data they
+//! need, and provenance.
 
 use super::figure_html;
 use super::glossary_html;
@@ -18,7 +19,7 @@ const CHAPTERS: [(Chapter, &str, &str); 5] = [
     (Chapter::Frfs, "frfs", "Frequency response functions"),
 ];
 
-/// The list of chapters, at the side.
+/// The list of chapters in the sidebar.
 pub fn contents(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
     html.raw("<nav aria-label=\"contents\"><ul><li><a href=\"#answer\">The answer</a></li>");
     for (chapter, id, title) in CHAPTERS {
@@ -68,7 +69,7 @@ pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
     html.raw("</section>");
 }
 
-/// What cannot be drawn in a chapter, those of the same need together.
+/// Figures that cannot be drawn in a chapter, grouped by the data they need.
 fn absent(chapter: Chapter, drawn: &Drawn<'_>) -> Vec<String> {
     let mut needs: Vec<(&str, Vec<&str>)> = Vec::new();
     for (entry, _) in drawn.iter().filter(|(entry, figure)| entry.chapter == chapter && figure.is_none()) {
@@ -88,7 +89,7 @@ fn chapter_is_empty(results: &Results, chapter: Chapter, drawn: &Drawn<'_>) -> b
         && tables_of(results, chapter).iter().all(Option::is_none)
 }
 
-/// Tables that explain one figure.
+/// Tables that accompany one figure.
 fn tables_beside(results: &Results, figure: &str) -> Vec<Option<String>> {
     match figure {
         "comparison" => vec![tables::side_by_side(results)],

@@ -1,4 +1,5 @@
-//! The page of two campaigns: the verdict, the differences, and the figures of both side by side on the same axes.
+//! The page that compares two campaigns: the verdict, the differences, and the figures of both side
+//! by side with the same axes.
 
 use super::text::Html;
 use super::{figure_html, glossary_html, shell};
@@ -9,11 +10,11 @@ use crate::report::words::brief;
 use crate::report::words::number::{micro, short};
 use crate::results::{Compared, Results};
 
-/// Figures that are shown of both.
+/// Figures shown for both campaigns.
 const SHOWN: [&str; 8] =
     ["levels", "backbone", "shaker-loops", "impacts", "specimens", "joint-spectrum", "decay-loops", "pulses"];
 
-/// The whole page as html.
+/// The whole page as HTML.
 pub fn comparison_page(compared: &Compared, both: [&Results; 2]) -> String {
     let mut drawn: Vec<Figure> = differences(compared).into_iter().collect();
     drawn.extend(side_by_side(both));
@@ -96,7 +97,7 @@ fn differences(compared: &Compared) -> Option<Figure> {
     Some(figure)
 }
 
-/// The figures that both have, panel beside panel.
+/// The figures that both have, with their panels side by side.
 fn side_by_side(both: [&Results; 2]) -> Vec<Figure> {
     let [of_a, of_b] = both.map(figures::all);
     let mut merged = Vec::new();
@@ -128,7 +129,7 @@ fn union(a: &Axis, b: &Axis) -> [f64; 2] {
     [a.range[0].min(b.range[0]), a.range[1].max(b.range[1])]
 }
 
-/// Names stand at places of their own: such an axis stays as it is.
+/// Sets the range of an axis; an axis of names is unchanged because its positions are fixed.
 fn ranged(axis: &Axis, range: [f64; 2]) -> Axis {
     if axis.names.is_empty() { Axis { range, ..axis.clone() } } else { axis.clone() }
 }

@@ -1,6 +1,7 @@
-// Figures come alive when they come near the window; what they show can be taken away as csv, svg and png.
+// Makes figures interactive when they come near the window, and exports what they show as csv, svg
+// and png.
 const alive=new Map();   // figure's name → its charts
-const pending=new Map(); // section and link → view of charts that are not alive yet
+const pending=new Map(); // section and link → view of charts that are not interactive yet
 const sectionOf=host=>host.closest('section')?.id||'';
 function link(from,name,view){
   const section=sectionOf(from.host);
@@ -28,7 +29,7 @@ function enliven(element,figure){
   element.classList.add('ready');
   return charts;
 }
-// a matrix stays a drawing; it says what a cell holds
+// a matrix stays a static drawing, with a tooltip for each cell
 class Cells{
   constructor(figure,panel,host){
     this.figure=figure;this.panel=panel;this.host=host;this.hidden=new Set();
@@ -37,7 +38,7 @@ class Cells{
     this.view={x:panel.x.range,y:panel.y.range,fixed:true};
     const rects=()=>[...host.querySelectorAll('rect[class^="f-"]')];
     const values=this.cells.values;
-    // only what is known is drawn
+    // only known values are drawn
     const shown=[...values.keys()].filter(i=>Number.isFinite(values[i]));
     this.at=shown[0];
     host.addEventListener('pointermove',e=>{const n=rects().indexOf(e.target);if(n>=0)this.say(shown[n])});
@@ -80,7 +81,7 @@ function toggle(figure,element,name,alone){
   for(const c of charts){c.hidden=hidden;if(c.plot)c.plot.redraw()}
   for(const item of element.querySelectorAll('.legend li'))item.querySelector('button')?.setAttribute('aria-pressed',String(!hidden.has(item.dataset.name)));
 }
-// the keys of a figure that has the focus
+// keyboard control of the figure that has the focus
 function keysOf(element,figure){
   element.addEventListener('keydown',e=>{
     if(e.target.closest('button,a,summary')||e.ctrlKey||e.metaKey||e.altKey)return;
@@ -93,7 +94,7 @@ function keysOf(element,figure){
     if(act){act();taken()}
   });
 }
-// the view as an SVG text of its own, on light paper
+// the view as a separate SVG text, on a light background
 function svgOf(figure,element){
   const charts=enliven(element,figure),columns=figure.columns,W=1040,gap=16,width=(W-gap*(columns-1))/columns;
   const light=root.dataset.light;root.dataset.light='light';
@@ -142,7 +143,7 @@ const scaleOf=(axis,[a,b],from,to)=>v=>{
   const share=(warp(axis,v)-warp(axis,a))/(warp(axis,b)-warp(axis,a));
   return from+share*(to-from);
 };
-// what is in view, one line for each point, as report/csv.rs writes the whole
+// the data in view, one line for each point, in the format of report/csv.rs
 function csvOf(figure,element){
   const charts=enliven(element,figure),lines=['panel,curve,horizontal,x,upright,y,low,high'];
   const quoted=t=>{t=/^[=+\-@\t]/.test(t)?"'"+t:t;return/[",\n\r]/.test(t)?`"${t.replace(/"/g,'""')}"`:t},num=v=>v===undefined||!Number.isFinite(v)?'':sixDigits(v);

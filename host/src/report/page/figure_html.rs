@@ -1,15 +1,16 @@
-//! A figure in the page: its sentence, its panels as vectors, where it came from; and the data by which the page makes it alive.
+//! A figure in the page: its description, its panels as SVG, its source, and the data from which
+//! the page's script makes it interactive.
 
 use super::text::{Html, escaped};
 use crate::outside::shown_json;
 use crate::report::figure::{Figure, Height, Panel, Shape, role};
 use crate::report::svg;
 
-/// Width of the page's text, px: what a panel that goes all across is drawn for.
+/// Width of the page's text, px; a full-width panel is drawn for it.
 const WIDE: f64 = 1040.0;
 const GAP: f64 = 16.0;
 
-/// The figure; `level` is that of its heading.
+/// The figure; `level` is the level of its heading.
 pub fn figure(html: &mut Html, figure: &Figure, level: u8) {
     let (name, columns) = (figure.name, figure.columns.clamp(1, 4));
     html.raw(&format!("<figure id=\"fig-{name}\" data-figure=\"{name}\" class=\"columns-{columns}\" tabindex=\"0\" role=\"group\" aria-label=\""));
@@ -78,7 +79,8 @@ fn source(html: &mut Html, figure: &Figure) {
     html.raw("</p></details>");
 }
 
-/// How every role looks but for its colours, which the style sheet has: an object of the page's script.
+/// The appearance of every role except its colours, which are in the style sheet, as an object for
+/// the page's script.
 pub fn roles() -> String {
     let looks = role::ALL.iter().map(|role| {
         let (name, width, dash, opacity) = (role.name(), role.width(), role.dash(), role.opacity());
@@ -87,14 +89,14 @@ pub fn roles() -> String {
     format!("{{{}}}", looks.collect::<Vec<_>>().join(","))
 }
 
-/// All figures as data; `<` cannot end the element.
+/// All figures as JSON data; `<` is escaped so that it cannot end the element.
 pub fn data<'a>(html: &mut Html, figures: impl Iterator<Item = &'a Figure>) {
     html.raw("<script type=\"application/json\" id=\"figures\">{\"figures\":[");
     for (i, figure) in figures.enumerate() {
         if i > 0 {
             html.raw(",");
         }
-        // a figure is plain data: there is nothing in it that could fail to be written
+        // a figure is plain data, so serialising it cannot fail
         let data = serde_json::to_string(figure).unwrap_or_else(|_| "null".into());
         html.raw(&shown_json(&data).replace('<', "\\u003c"));
     }

@@ -1,4 +1,5 @@
-//! The first screen: on what was measured, the answer, why its parts differ, what failed; one figure beside it.
+//! The first screen: what was measured, the answer, why its parts differ, which checks failed; with
+//! one figure.
 
 use super::figure_html;
 use super::text::{Html, escaped};
@@ -8,7 +9,7 @@ use crate::report::words::line::{Line, UNKNOWN};
 use crate::report::words::{self, answer_sentences, brief};
 use crate::results::Results;
 
-/// The answer beside its figure.
+/// The answer next to its figure.
 pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figure>)]) {
     html.raw("<section id=\"answer\" class=\"first\"><div class=\"words\"><h1>How stiff is the contact in its sliding direction?</h1>");
     let mut lines = brief::answer(results);
@@ -31,7 +32,7 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
         let known = lines.iter().any(|line| !line.text.starts_with(UNKNOWN) && !line.is_truth());
         html.raw(if known { "<div class=\"found\">" } else { "<div class=\"found warn\">" });
         for (i, line) in lines.iter().enumerate() {
-            // what is not known has its reason in letters of the usual size
+            // a value that is not known is shown in normal size, with its reason
             let large = i == 0 && !line.head.is_empty() && !line.text.starts_with(UNKNOWN);
             html.raw(if large { "<p class=\"headline\">" } else { "<p>" });
             if !line.head.is_empty() {
@@ -58,7 +59,7 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
     html.raw("</section>");
 }
 
-/// So many things that are missing are named on the first screen.
+/// Number of missing items that are named on the first screen.
 const NAMED: usize = 3;
 
 fn missing(html: &mut Html, results: &Results) {
@@ -75,7 +76,7 @@ fn missing(html: &mut Html, results: &Results) {
     html.raw("</ul></div>");
 }
 
-/// A line's text, in which each number says where it stands in `results.json`.
+/// A line's text, in which each number is marked with its path in `results.json`.
 fn told(html: &mut Html, line: &Line) {
     let mut rest = escaped(&line.text);
     for (shown, place) in &line.numbers {

@@ -1,4 +1,4 @@
-//! The glossary in the page, from the same text as `docs/glossary.md`.
+//! The glossary in the page, from the text of `docs/glossary.md`.
 
 use super::text::{Html, escaped};
 
@@ -20,7 +20,7 @@ pub fn list(html: &mut Html) {
     html.raw("</dl>");
 }
 
-/// A term as the name of its place.
+/// A term as an HTML anchor.
 pub fn anchor(term: &str) -> String {
     term.chars()
         .filter_map(|c| {

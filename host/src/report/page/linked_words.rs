@@ -1,10 +1,11 @@
-//! Terms of the glossary, linked where the page uses them first; and what stands between backticks, as code.
+//! Links the first use of each glossary term in the page, and marks text between backticks as code.
 
 use super::glossary_html::{anchor, terms};
 use super::text::escaped;
 use std::cmp::Reverse;
 
-/// Where no link may stand: in another one, in headings, drawings and controls, and in the glossary itself.
+/// Elements in which no link is allowed: other links, headings, drawings and controls, and the
+/// glossary itself.
 const CLOSED: [&str; 12] = [
     "a",
     "nav",
@@ -20,7 +21,7 @@ const CLOSED: [&str; 12] = [
     "span class=\"bad\"",
 ];
 
-/// A term that was not used so far.
+/// A term that has not been used so far.
 struct Term {
     term: &'static str,
     link: String,
@@ -38,7 +39,7 @@ pub fn linked(body: &str) -> String {
             ),
         })
         .collect();
-    // `slope between the spots` comes before `spots`
+    // longer terms first: `slope between the spots` before `spots`
     unused.sort_by_key(|t| Reverse(t.term.len()));
     let mut out = String::with_capacity(body.len() + 16_000);
     let mut closed: Vec<&str> = Vec::new();
@@ -54,7 +55,7 @@ pub fn linked(body: &str) -> String {
     out
 }
 
-/// Keeps account of the elements in which no link may stand; `tag` is what stands between its brackets.
+/// Tracks the elements in which no link is allowed; `tag` is the text between its angle brackets.
 fn follow<'a>(tag: &'a str, closed: &mut Vec<&'a str>) {
     let name = |tag: &'a str| tag.split([' ', '/']).next().unwrap_or(tag);
     if let Some(ended) = tag.strip_prefix('/') {
@@ -74,7 +75,7 @@ fn follow<'a>(tag: &'a str, closed: &mut Vec<&'a str>) {
 /// One run of text, with its links and code.
 fn text(out: &mut String, run: &str, unused: &mut Vec<Term>, open: bool) {
     let parts: Vec<&str> = run.split('`').collect();
-    // a lone backtick is nobody's code
+    // an unpaired backtick does not mark code
     if parts.len().is_multiple_of(2) {
         return words(out, run, unused, open);
     }
@@ -120,7 +121,8 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// How many bytes at the start of `run` are this term or its plural; none where they are not.
+/// Number of bytes at the start of `run` that match this term or its plural; `None` without a
+/// match.
 fn length(run: &str, term: &str) -> Option<usize> {
     let mut letters = run.char_indices();
     let mut end = 0;

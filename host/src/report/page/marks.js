@@ -1,10 +1,10 @@
-// The marks of a panel, drawn with a pen: the twin of report/svg/marks.rs.
+// Draws the marks of a panel with a pen, as report/svg/marks.rs does.
 const unpack=s=>{
   if(typeof s!=='string')return s;
   const bytes=Uint8Array.from(atob(s.slice(4)),c=>c.charCodeAt(0));
   return new Float32Array(bytes.buffer);
 };
-// curves as numbers, once
+// decodes the numbers of curves once
 function unpackMark(mark){
   for(const shape of[mark.line,mark.ribbon,mark.points,mark.loop,mark.cells,mark.strips]){
     if(!shape)continue;
@@ -17,8 +17,9 @@ const along=x=>x.length===undefined?i=>x.first+x.step*i:i=>x[i];
 const countOf=(x,y)=>Math.min(x.length===undefined?x.count:x.length,y.length);
 const RADIUS=4;
 
-// a curve thinned to what its pixel columns show: first, lowest, highest, last of each
-// what lies further than half the frame beyond it breaks the curve: lines to and from there would stand as a hedge
+// a curve reduced to what its pixel columns show: first, lowest, highest, last point of each
+// values further outside than half the frame interrupt the curve: the lines to and from them would
+// look like a hatched area
 function curve(pen,x,y,n,sx,sy,look,box){
   const at=along(x),points=[],far=.5*(box.bottom-box.top);
   let column=NaN,held=null;
@@ -104,7 +105,7 @@ function drawMark(pen,mark,sx,sy,box,look){
   }else if((m=mark.ring)||(m=mark.text)){
     const x=sx(m.at[0]),y=sy(m.at[1]),k=pen.k;
     if(x<box.left||x>box.right||y<box.top||y>box.bottom)return;
-    // above the ring: curves leave it sideways
+    // above the ring, because curves leave it sideways
     if(mark.ring){pen.circle(x,y,9*k,null,look.colour);pen.text(x,Math.max(y-14*k,box.top+12*k),m.text,'middle','ink',12.5);return}
     const end=x+6.6*k*m.text.length>box.right;
     pen.text(x,Math.max(y,box.top+12*k),m.text,end?'end':'start','ink',12.5);

@@ -1,4 +1,5 @@
-//! The page: the answer, then figures and tables by chapter, in one html text without anything from outside.
+//! The page: the answer, then figures and tables by chapter, in one HTML text without external
+//! resources.
 
 mod chapters;
 mod comparison_page;
@@ -21,7 +22,7 @@ pub(super) use text::{Html, escaped};
 const STYLE: &str = include_str!("page.css");
 const CHARTS_STYLE: &str = include_str!("../../../vendor/uplot/uPlot.min.css");
 const CHARTS: &str = include_str!("../../../vendor/uplot/uPlot.iife.min.js");
-/// What makes figures alive, in the order in which they build on one another.
+/// The scripts that make figures interactive, in order of dependency.
 const FIGURE_SCRIPTS: [&str; 7] = [
     include_str!("ticks.js"),
     include_str!("marks.js"),
@@ -31,10 +32,10 @@ const FIGURE_SCRIPTS: [&str; 7] = [
     include_str!("arms.js"),
     include_str!("figure.js"),
 ];
-/// The report as a whole.
+/// The script of the report page.
 const PAGE_SCRIPT: &str = include_str!("page.js");
 
-/// The whole report as html.
+/// The whole report as HTML.
 pub fn page(results: &Results) -> String {
     let drawn: Vec<_> = figures::ALL.iter().map(|entry| (entry, entry.of(results))).collect();
     let mut body = Html::default();
@@ -48,7 +49,8 @@ pub fn page(results: &Results) -> String {
     shell(&title, &brief::on_what(results), results.source.simulated, &body.finish(), figures)
 }
 
-/// A page around `body`: its policy, style, banner, the figures' data, and the script that makes them alive.
+/// A page around `body`: its policy, style, banner, the figures' data, and the script that makes
+/// them interactive.
 fn shell<'a>(
     title: &str,
     banner: &str,
@@ -72,7 +74,7 @@ fn shell<'a>(
     html.finish()
 }
 
-/// The script of a page whose figures are alive, with `own` behind what makes them so.
+/// The script of a page with interactive figures, followed by `own`.
 pub fn script(own: &str) -> String {
     format!(
         "{CHARTS}\n(()=>{{\"use strict\";\n{}ROLES={};\n{own}}})();\n",
@@ -81,7 +83,7 @@ pub fn script(own: &str) -> String {
     )
 }
 
-/// A figure as html: its panels as vectors, which a page's script replaces by charts that are alive.
+/// A figure as HTML: its panels as SVG, which a page's script replaces by interactive charts.
 pub fn figure_fragment(figure: &Figure) -> String {
     let mut html = Html::default();
     figure_html::figure(&mut html, figure, 3);

@@ -1,4 +1,4 @@
-// The page as a whole: which figures there are, their buttons and keys, light and dark.
+// The page as a whole: its figures, their buttons and keys, light and dark theme.
 const DATA=JSON.parse(document.getElementById('figures').textContent),FIGURES=DATA.figures;
 root.classList.add('scripted');
 function button(parent,text,title,act){

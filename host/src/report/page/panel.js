@@ -1,4 +1,4 @@
-// One panel alive: uPlot gives axes, cursor and selection, the marks are ours.
+// One interactive panel: uPlot provides axes, cursor and selection; the marks are drawn here.
 const root=document.documentElement;
 const css=name=>getComputedStyle(root).getPropertyValue(name).trim();
 let ROLES={};
@@ -8,12 +8,13 @@ const ROW=42;
 const BELOW=46;
 const labelOf=a=>a.unit?`${a.quantity}, ${a.unit}`:a.quantity;
 const frameHeight=(panel,width)=>panel.height==='rows'?ROW*panel.y.names.length:panel.height==='square'?Math.min(460,.8*(width-78)):HEIGHTS[panel.height];
-// a view cannot be narrower than this part of the whole: numbers have only so many digits
+// a view cannot be narrower than this fraction of the whole, because numbers have a limited number
+// of digits
 const NARROWEST=1e-6;
 const lin=a=>a.scale!=='log';
 const warp=(a,v)=>lin(a)?v:Math.log(v);
 const unwarp=(a,v)=>lin(a)?v:Math.exp(v);
-// [low, high] held within the axis as a whole
+// [low, high] clamped to the full range of the axis
 function held(axis,[low,high]){
   const[a,b]=axis.range.map(v=>warp(axis,v)),least=NARROWEST*(b-a);
   let l=Math.max(a,Math.min(b,warp(axis,Math.max(low,lin(axis)?-Infinity:Number.MIN_VALUE)))),h=Math.max(a,Math.min(b,warp(axis,high)));
@@ -37,7 +38,8 @@ function axisTicks(axis,view,length,up){
   if(axis.every&&(view[1]-view[0])/axis.every>=2)return ticksEvery(view[0],view[1],axis.every);
   return ticks(axis.scale,view[0],view[1],length,up);
 }
-// whether an axis makes sense both ways: not names, not degrees, nothing that swings about zero
+// whether an axis can be both linear and logarithmic: not names, not degrees, not values that
+// change sign
 const canSpread=(panel,key)=>{const a=panel[key];return!a.names&&!a.every&&a.link!=='cycle'&&a.range[0]>=0&&a.range[1]>0&&!(key==='y'&&panel.height==='rows')};
 class Chart{
   constructor(figure,panel,host){
@@ -77,7 +79,7 @@ class Chart{
     },[null,[this.view.x,this.view.y]],host);
     const over=this.plot.over;
     over.addEventListener('wheel',e=>{
-      // a page must scroll: the wheel zooms where one has clicked, or with Ctrl
+      // the wheel must scroll the page, so it zooms only after a click or with Ctrl
       if(!e.ctrlKey&&!host.closest('figure').contains(document.activeElement))return;
       e.preventDefault();
       const factor=e.deltaY<0?.8:1.25,at=this.plot.posToVal(e.offsetX,'x');
@@ -85,7 +87,8 @@ class Chart{
     },{passive:false});
     over.addEventListener('dblclick',()=>this.whole());
   }
-  // the axis `key` even or by logarithm; the whole of it is then what can be shown so
+  // makes the axis `key` linear or logarithmic; its full range is then the part that can be shown
+  // so
   spread(key,scale){
     const axis=this.panel[key],first=this.first[key];
     if(axis.scale===scale||!canSpread(this.panel,key))return;
@@ -96,7 +99,7 @@ class Chart{
     this.plot.destroy();
     this.make();
   }
-  // the smallest positive value, but no more than six decades down
+  // the smallest positive value, but at most six decades below the largest
   least(key,high){
     let least=high;
     for(const m of this.panel.marks){
@@ -129,7 +132,7 @@ class Chart{
     u.setSelect({left:0,top:0,width:0,height:0},false);
     this.zoom(view);
   }
-  // zooms this panel, and the others of its links
+  // zooms this panel and the others with the same links
   zoom(view){
     this.show(view);
     for(const key of['x','y'])if(view[key]&&this.panel[key].link)link(this,this.panel[key].link,view[key]);
@@ -150,7 +153,7 @@ class Chart{
     const out=this.host.closest('figure').querySelector('.readout');
     if(out&&words)out.textContent=words;
   }
-  // what all curves say at x
+  // the values of all curves at x
   words(x,left,top){
     if(this.figure.name==='interface-modes')return modeWords(this,x,top);
     const p=this.panel,parts=[];
@@ -168,7 +171,7 @@ class Chart{
     if(p.x.names||p.height==='rows')return parts.join(' · ');
     return[`${p.x.quantity} ${sixDigits(x)} ${p.x.unit}`,...parts.map(t=>`${t} ${p.y.unit}`)].join(' · ');
   }
-  // from one point to the next, in the order in which they lie
+  // steps from one point to the next, in order of position
   stepPoint(by){
     const p=this.panel,along=p.height==='rows'?'y':'x',all=[];
     for(const m of this.marks())if(m.points)for(let i=0;i<m.points.x.length;i++)all.push({x:m.points.x[i],y:m.points.y[i],m,i});

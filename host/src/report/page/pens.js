@@ -1,4 +1,4 @@
-// Pens: the same marks on a canvas, or as the text of an SVG file.
+// Pens: draw the same marks on a canvas or as the text of an SVG file.
 class CanvasPen{
   constructor(ctx,k,paper,ink){this.ctx=ctx;this.k=k;this.named={paper,ink}}
   colour(c){return this.named[c]||c}

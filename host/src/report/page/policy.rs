@@ -1,10 +1,11 @@
-//! What the page may do: run its one script, use its one style sheet, and nothing from anywhere else.
+//! Content security policy: the page may run its one script, use its one style sheet, and load
+//! nothing else.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use sha2::{Digest, Sha256};
 
-/// The policy as an element of the head; hashes are of these very texts.
+/// The policy as a meta element; the hashes are those of these texts.
 pub fn meta(style: &str, script: &str) -> String {
     let hash = |text: &str| BASE64_STANDARD.encode(Sha256::digest(text.as_bytes()));
     format!(

@@ -1,4 +1,4 @@
-// A scene in space that can be turned: the twin of report/svg/scene.rs.
+// A scene in space that can be rotated; report/svg/scene.rs draws the same.
 const SVG='http://www.w3.org/2000/svg';
 function node(parent,name,attributes,text){
   const n=document.createElementNS(SVG,name);
@@ -54,20 +54,21 @@ class SceneView{
     },w,h);
     this.drawn=(this.drawn||0)+1;
   }
-  // where a place of arm A (side 1) or B (side −1) goes when the arms move against one another
+  // displaced position of a point of arm A (side 1) or B (side −1) when the arms move against one
+  // another
   displaced(p,side,reach){
     const m=this.motion;
     if(!m||!side)return p;
     const[x,y,z,rx,ry,rz]=m,by=.5*side*(this.swing??1),turn=.5,[a,b,c]=p;
     return[a+by*(.35*reach*x+turn*(ry*c-rz*b)),b+by*(.35*reach*y+turn*(rz*a-rx*c)),c+by*(.35*reach*z+turn*(rx*b-ry*a))];
   }
-  // everything, by a pen of four strokes, on a sheet w × h px
+  // draws everything with a pen of four strokes, on a sheet of w × h px
   paint(pen,w,h){
     const side=role=>/-a$/.test(role)?1:/-b$/.test(role)?-1:0;
     const all=[...this.scene.bodies.flatMap(b=>this.corners(b)),...this.scene.spots.map(s=>s.at)].map(p=>this.seen(p));
     const ends=i=>[Math.min(...all.map(p=>p[i])),Math.max(...all.map(p=>p[i]))];
     const[left,right]=ends(0),[top,bottom]=ends(1),reach=.5*Math.max(1e-3,Math.hypot(right-left,bottom-top));
-    // room for names beside the outermost places, and for arms that move
+    // leave space for names next to the outermost positions, and for moving arms
     const size=this.size*Math.min((w-(this.scene.spots.length?120:60))/Math.max(right-left,1e-3),(h-40)/Math.max(bottom-top,1e-3))*(this.scene.spots.length?1:.8);
     const at=(p,role)=>{const s=this.seen(this.displaced(p,side(role),reach));return[w/2+size*(s[0]-(left+right)/2),h/2+size*(s[1]-(top+bottom)/2),s[2]]};
     for(const b of this.scene.bodies){

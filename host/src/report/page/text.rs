@@ -1,47 +1,49 @@
-//! Html under way: everything from a file goes through [`escaped`], and no number is parted from its unit.
+//! Builds HTML: all text from a file is escaped by [`escaped`], and no number is separated from its
+//! unit by a line break.
 
 use crate::report::svg::drawing::escape;
 use std::fmt::Write;
 
-/// A page under way.
+/// HTML under construction.
 #[derive(Debug, Default)]
 pub struct Html(String);
 
 impl Html {
-    /// Markup of ours.
+    /// Appends trusted markup.
     pub fn raw(&mut self, markup: &str) {
         self.0.push_str(markup);
     }
 
-    /// Text from anywhere.
+    /// Appends untrusted text, escaped.
     pub fn text(&mut self, text: &str) {
         self.0.push_str(&escaped(text));
     }
 
-    /// Text from anywhere within an element of ours; `open` is what stands between its angle brackets.
+    /// Appends an element with untrusted text, escaped; `open` is the trusted text between its
+    /// angle brackets.
     pub fn element(&mut self, open: &str, text: &str) {
         let tag = open.split(' ').next().unwrap_or(open);
         let _ = write!(self.0, "<{open}>{}</{tag}>", escaped(text));
     }
 
-    /// What was written.
+    /// The HTML written so far.
     pub fn finish(self) -> String {
         self.0
     }
 }
 
-/// Text made safe for html, with numbers and units held together.
+/// Text escaped for HTML, with no line break between numbers and units.
 pub fn escaped(text: &str) -> String {
     unbroken(&escape(text))
 }
 
-/// What stands behind a number and is not parted from it.
+/// Units that are not separated from the number before them.
 const UNITS: [&str; 22] = [
     "N/µm", "N/m", "N s/m", "N m/rad", "µm/N", "m/N", "µm", "nm", "mm", "ms", "Hz", "%", "°", "N", "µJ",
     "kg", "s", "m", "dB", "MB", "IDMs", "hits",
 ];
 
-/// Spaces between a number and its unit, and around ±, do not break.
+/// Replaces spaces between a number and its unit, and around ±, by no-break spaces.
 pub fn unbroken(text: &str) -> String {
     const HARD: char = '\u{a0}';
     let mut out = String::with_capacity(text.len());
@@ -49,14 +51,14 @@ pub fn unbroken(text: &str) -> String {
     for (i, c) in text.char_indices() {
         if c != ' ' {
             out.push(c);
-            // nor is a unit parted at its stroke
+            // no line break within a unit such as N/µm
             let above = || text[..i].rsplit(|c: char| !c.is_alphanumeric() && c != '_').next();
             let below = text[i + c.len_utf8()..].starts_with(['µ', 'm', 'N', 'r']);
             let unit = c == '/' && below && matches!(above(), Some("N" | "m" | "µm"));
             if unit {
                 out.push('\u{2060}');
             }
-            // a range stays on one line
+            // no line break within a range
             if c == '…' && before.is_ascii_digit() {
                 out.push('\u{2060}');
             }

@@ -1,4 +1,4 @@
-// Ticks of an axis: the twin of report/scale.rs, which a test holds them to.
+// Ticks of an axis, computed as in report/scale.rs; a test compares the two.
 const DIGIT=7,BESIDE=26,ABOVE=30,TIGHT_ABOVE=16,TIGHT_BESIDE=48,NEAR=1e-9,MOST_TICKS=200;
 const exponent=v=>+v.toExponential().split('e')[1];
 const power=(digit,decade)=>+(digit+'e'+decade);
@@ -63,5 +63,5 @@ function decadeTicks(low,high,length,up){
     return t;
   });
 }
-// scale: 'linear' or 'log'; length in px; up: whether the axis is upright
+// scale: 'linear' or 'log'; length in px; up: whether the axis is vertical
 const ticks=(scale,low,high,length,up)=>scale==='log'?decadeTicks(low,high,length,up):evenTicks(low,high,length,up);

@@ -1,28 +1,28 @@
-//! Vector drawings as SVG text, made to stand inside one html page.
+//! Vector drawings as SVG text that can be embedded in one HTML page.
 
 use std::fmt::Write;
 
 use crate::outside::visible;
 
-/// How a line looks.
+/// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke<'a> {
-    /// Its class: the style sheet gives the colour.
+    /// Its class; the style sheet sets the colour.
     pub class: &'a str,
     /// Width, px.
     pub width: f64,
-    /// Dash pattern, empty for a full line.
+    /// Dash pattern, empty for a solid line.
     pub dash: &'static str,
 }
 
 impl<'a> Stroke<'a> {
-    /// A full line.
+    /// A solid line.
     pub const fn new(class: &'a str, width: f64) -> Self {
         Stroke { class, width, dash: "" }
     }
 }
 
-/// Where a text hangs on its point.
+/// Horizontal alignment of a text at its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// The point is at its left end.
@@ -58,7 +58,7 @@ impl Area {
     }
 }
 
-/// A drawing under way.
+/// A drawing under construction.
 #[derive(Debug)]
 pub struct Drawing {
     name: String,
@@ -69,7 +69,7 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// An empty drawing; `name` keeps its ids apart from those of the page's other drawings.
+    /// An empty drawing; `name` makes its ids differ from those of the page's other drawings.
     pub fn new(name: &str, width: f64, height: f64) -> Self {
         Drawing { name: name.to_owned(), width, height, clips: 0, body: String::new() }
     }
@@ -80,8 +80,8 @@ impl Drawing {
         self.path(&path, stroke);
     }
 
-    /// A curve through points in pixels; `None` breaks it. Many points in one pixel column are reduced to
-    /// the lowest and the highest, which looks the same.
+    /// A curve through points in pixels, with a gap at `None`. If many points share a pixel column
+    /// they are reduced to the lowest and the highest, which looks the same.
     pub fn curve(&mut self, points: &[Option<[f64; 2]>], stroke: Stroke<'_>) {
         let path = path_of(points);
         if !path.is_empty() {
@@ -102,7 +102,7 @@ impl Drawing {
         ));
     }
 
-    /// A closed curve through points, filled.
+    /// A filled closed curve through points.
     pub fn area(&mut self, points: &[[f64; 2]], class: &str, opacity: f64) {
         let path = path_of(&points.iter().copied().map(Some).collect::<Vec<_>>());
         if !path.is_empty() {
@@ -137,7 +137,7 @@ impl Drawing {
         self.push(format_args!("<path d=\"{path}\" class=\"{class}\" fill-opacity=\"{opacity:.2}\"/>"));
     }
 
-    /// Round or square points this wide, as one shape.
+    /// Round or square points of this width, as one shape.
     pub fn ends(&mut self, points: &[[f64; 2]], class: &str, width: f64, round: bool) {
         let mut path = String::new();
         for p in points {
@@ -148,7 +148,7 @@ impl Drawing {
         self.push(format_args!("<path d=\"{path}\" class=\"{class}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\" fill=\"none\"/>"));
     }
 
-    /// Lying crosses, as one shape.
+    /// Diagonal crosses, as one shape.
     pub fn crosses(&mut self, points: &[[f64; 2]], class: &str, half: f64) {
         let (whole, back) = (px(2.0 * half), px(-2.0 * half));
         let one = |p: &[f64; 2]| {
@@ -158,7 +158,7 @@ impl Drawing {
         self.push(format_args!("<path d=\"{path}\" class=\"{class}\" stroke-width=\"1.8\" fill=\"none\"/>"));
     }
 
-    /// A dot or ring; `classes` fill and stroke it.
+    /// A dot or ring; `classes` define its fill and stroke.
     pub fn dot(&mut self, at: [f64; 2], radius: f64, classes: &str) {
         self.push(format_args!(
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" class=\"{classes}\" stroke-width=\"1.4\"/>",
@@ -168,7 +168,7 @@ impl Drawing {
         ));
     }
 
-    /// A square, full or empty.
+    /// A square, filled or empty.
     pub fn square(&mut self, at: [f64; 2], half: f64, classes: &str) {
         self.push(format_args!(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"{classes}\" stroke-width=\"1.4\"/>",
@@ -179,7 +179,7 @@ impl Drawing {
         ));
     }
 
-    /// A text; `class` chooses its size and colour in the page's style sheet.
+    /// A text; `class` selects its size and colour in the page's style sheet.
     pub fn text(&mut self, at: [f64; 2], anchor: Anchor, class: &str, text: &str) {
         let anchor = match anchor {
             Anchor::Start => "start",
@@ -194,7 +194,7 @@ impl Drawing {
         ));
     }
 
-    /// A text that reads upwards.
+    /// A text rotated to read upwards.
     pub fn text_upwards(&mut self, at: [f64; 2], class: &str, text: &str) {
         self.push(format_args!(
             "<text transform=\"translate({} {}) rotate(-90)\" text-anchor=\"middle\" class=\"{class}\">{}</text>",
@@ -204,7 +204,7 @@ impl Drawing {
         ));
     }
 
-    /// Draws what `inside` draws, cut off at the edges of `area`.
+    /// Draws the output of `inside`, clipped at the edges of `area`.
     pub fn clipped(&mut self, area: Area, inside: impl FnOnce(&mut Drawing)) {
         self.clips += 1;
         let id = format!("{}-{}", self.name, self.clips);
@@ -219,13 +219,13 @@ impl Drawing {
         self.body.push_str("</g>");
     }
 
-    /// The finished drawing; `meaning` is read to those who cannot see it.
+    /// The finished drawing; `meaning` is read out by screen readers.
     pub fn finish(self, meaning: &str) -> String {
         let size = format!("0 0 {} {}", px(self.width), px(self.height));
         format!("<svg viewBox=\"{size}\" role=\"img\" aria-label=\"{}\">{}</svg>", escape(meaning), self.body)
     }
 
-    /// The finished drawing as an ornament that need not be read out.
+    /// The finished drawing as a decoration that screen readers skip.
     pub fn decoration(self) -> String {
         let (width, height) = (px(self.width), px(self.height));
         format!(
@@ -234,7 +234,7 @@ impl Drawing {
         )
     }
 
-    /// The finished drawing as a part of a larger one, with its upper left corner at `at`.
+    /// The finished drawing as part of a larger one, with its upper left corner at `at`.
     pub fn inside(self, at: [f64; 2]) -> String {
         let (x, y, width, height) = (px(at[0]), px(at[1]), px(self.width), px(self.height));
         format!("<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\">{}</svg>", self.body)
@@ -250,7 +250,8 @@ impl Drawing {
     }
 }
 
-/// A path in tenths of a pixel, each point relative to the one before: half as long as with places.
+/// A path in tenths of a pixel, each point relative to the one before: half as long as with
+/// absolute positions.
 fn path_of(points: &[Option<[f64; 2]>]) -> String {
     let mut path = String::new();
     for run in points.split(Option::is_none) {
@@ -294,12 +295,12 @@ fn tenths(path: &mut String, value: i64) {
     }
 }
 
-/// Far-away values are held where every browser can draw them.
+/// Clamps distant values to a range that every browser can draw.
 fn held(value: f64) -> f64 {
     if value.is_finite() { value.clamp(-20_000.0, 20_000.0) } else { 0.0 }
 }
 
-/// Per pixel column, in the order they come: lowest and highest.
+/// Reduces each pixel column to its lowest and highest point, in their original order.
 fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut kept = Vec::new();
     for column in run.chunk_by(|a, b| a[0].floor() == b[0].floor()) {
@@ -318,13 +319,13 @@ fn thinned(run: &[[f64; 2]]) -> Vec<[f64; 2]> {
     kept
 }
 
-/// Pixels to a tenth.
+/// Pixels, rounded to a tenth.
 fn px(value: f64) -> String {
     let text = format!("{:.1}", held(value));
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// Text made safe inside html and svg.
+/// Text escaped for HTML and SVG.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in visible(text).chars() {

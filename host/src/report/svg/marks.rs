@@ -1,11 +1,11 @@
-//! The marks of a panel, drawn. The page's twin is `page/marks.js`.
+//! Draws the marks of a panel. `page/marks.js` does the same in the page.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::place::Place;
 use super::sign::{self, RADIUS};
 use crate::report::figure::{Along, Bars, Mark, Marker, Packed, Role, Shape};
 
-/// One mark; what lies outside the frame is cut by who calls.
+/// Draws one mark; the caller clips what lies outside the frame.
 pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
     let role = mark.role;
     let class = format!("s-{}", role.name());
@@ -54,7 +54,7 @@ pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
         Shape::Ring { at, text } => {
             let Some(at) = inside(place, *at) else { return };
             drawing.dot(at, 9.0, &format!("none {class}"));
-            // above the ring: curves leave it sideways
+            // above the ring, because curves leave it sideways
             let up = (at[1] - 14.0).max(place.area.top + 12.0);
             drawing.text([at[0], up], Anchor::Middle, "legend", text);
         }
@@ -68,10 +68,10 @@ pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
     }
 }
 
-/// So many points are drawn as one shape each, which keeps the page small.
+/// From this number on, points are drawn as one shape, which keeps the page small.
 const MANY: usize = 60;
 
-/// Many points at once: dots and rings are the round ends of lines without length.
+/// Many points in one shape: dots and rings are the round caps of lines of zero length.
 fn swarm(drawing: &mut Drawing, at: &[[f64; 2]], class: &str, marker: Marker) {
     match marker {
         Marker::Dot | Marker::Square => drawing.ends(at, class, 2.0 * RADIUS, marker == Marker::Dot),
@@ -83,7 +83,7 @@ fn swarm(drawing: &mut Drawing, at: &[[f64; 2]], class: &str, marker: Marker) {
     }
 }
 
-/// A word that starts at `at`, or ends there where the frame does.
+/// A word that starts at `at`, or ends there if it would leave the frame.
 fn word(drawing: &mut Drawing, place: &Place, at: [f64; 2], text: &str) {
     let width = 6.6 * text.chars().count() as f64;
     let (x, anchor) =
@@ -91,7 +91,8 @@ fn word(drawing: &mut Drawing, place: &Place, at: [f64; 2], text: &str) {
     drawing.text([x, at[1].max(place.area.top + 12.0)], anchor, "legend", text);
 }
 
-/// A value that lies further than half the frame beyond it breaks the curve: lines to and from there would stand as a hedge.
+/// A value further outside than this fraction of the frame interrupts the curve: the lines to and
+/// from such values would look like a hatched area.
 const BEYOND: f64 = 0.5;
 
 fn points(place: &Place, x: &Along, y: &Packed) -> Vec<Option<[f64; 2]>> {
@@ -125,7 +126,7 @@ fn ribbon(
     drawing.area(&around, fill, role.opacity());
 }
 
-/// A bar with caps at its ends; an end that lies beyond the frame has an arrow at the frame instead.
+/// An error bar with caps; an end beyond the frame is drawn as an arrow at the frame.
 fn bar(
     drawing: &mut Drawing,
     place: &Place,
@@ -169,10 +170,11 @@ fn cells(drawing: &mut Drawing, place: &Place, fill: &str, values: &Packed) {
     }
 }
 
-/// From which value on a strip is drawn, and how strongly: steps keep the drawing small, and good data stays white.
+/// Thresholds below which a strip is drawn, with the opacity: a few steps keep the drawing small,
+/// and good data remains white.
 const STEPS: [(f32, f64); 5] = [(0.5, 1.0), (0.7, 0.75), (0.9, 0.5), (0.95, 0.3), (0.99, 0.15)];
 
-/// How strongly a value of a strip is drawn; none where it is good.
+/// Opacity for a value of a strip; `None` if the value is good.
 fn strength(value: f32) -> Option<f64> {
     STEPS.iter().find(|(below, _)| value < *below).map(|(_, strength)| *strength)
 }
@@ -180,7 +182,7 @@ fn strength(value: f32) -> Option<f64> {
 fn strips(drawing: &mut Drawing, place: &Place, fill: &str, x: &Packed, values: &Packed) {
     let columns = x.0.len();
     let edge = |i: usize| place.x.place_within(f64::from(x.0[i.min(columns - 1)]));
-    // all runs of one strength are one shape
+    // all runs of the same opacity are one shape
     for (_, opacity) in STEPS {
         let mut areas = Vec::new();
         for (row, strip) in values.0.chunks(columns.max(1)).enumerate() {

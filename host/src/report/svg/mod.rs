@@ -1,4 +1,4 @@
-//! Figures as vectors: panels for the page and for print, whole files to stand alone.
+//! Figures as SVG: panels for the page and for print, and standalone files.
 
 pub mod drawing;
 mod marks;
@@ -12,29 +12,30 @@ pub use panel::panel;
 use super::figure::{Drawn, Figure, Role, role};
 use drawing::{Anchor, Drawing, Stroke, escape};
 
-/// Between panels, px.
+/// Gap between panels, px.
 const GAP: f64 = 16.0;
-/// Of the title and its sentence above the panels, px.
+/// Height of the title and its sentence above the panels, px.
 const HEAD: f64 = 52.0;
-/// The width of a figure that stands alone, px.
+/// Width of a standalone figure, px.
 pub const WIDTH: f64 = 1040.0;
-/// Of a letter at the size of legends, px; a guess on the wide side.
+/// Width of a letter in legends, px; a generous estimate.
 const LETTER: f64 = 6.8;
 
 const STYLE: &str = "text{fill:#333;stroke:none;font-family:system-ui,\"Segoe UI\",Roboto,\"Liberation Sans\",\"DejaVu Sans\",Arial,sans-serif}\
     .tick{font-size:12px}.legend{font-size:12.5px}.label{font-size:13px}.title{font-size:14px;font-weight:600}.heading{font-size:17px;font-weight:600}\
     .paper{fill:#fff}.frame{stroke:#888}.grid{stroke:#e4e4e4}.none{fill:none}.s-paper{stroke:#fff}";
 
-/// What is other on dark paper.
+/// Differences of the style on a dark background.
 const DARK: &str =
     "text{fill:#ccc}.paper{fill:#16181b}.frame{stroke:#777}.grid{stroke:#33363b}.s-paper{stroke:#16181b}";
 
-/// The figure as an SVG file of its own, on light paper.
+/// The figure as a standalone SVG file, on a light background.
 pub fn file(figure: &Figure) -> String {
     with_style(figure, "", &format!("{STYLE}{}", role::plain_classes()))
 }
 
-/// The same for a notebook: on the reader's paper, light or dark, and with a style that stays within the drawing.
+/// The same for a notebook: on the reader's background, light or dark, with a style limited to the
+/// drawing.
 pub fn notebook(figure: &Figure) -> String {
     let id = format!("jointrig-{}", figure.name);
     let [light, dark] = [false, true].map(role::variables);
@@ -96,7 +97,7 @@ fn legend(entries: &[(&str, Role, Drawn)], width: f64) -> Drawing {
     drawing
 }
 
-/// How a mark looks, 22 px wide, for a legend.
+/// Sample of a mark, 22 px wide, for a legend.
 pub fn sample(drawing: &mut Drawing, role: Role, drawn: Drawn, [x, y]: [f64; 2]) {
     let class = format!("s-{}", role.name());
     match drawn {
@@ -112,7 +113,7 @@ pub fn sample(drawing: &mut Drawing, role: Role, drawn: Drawn, [x, y]: [f64; 2])
     }
 }
 
-/// The sample of a legend's entry as a little picture, for the page.
+/// The sample of a legend entry as a small picture, for the page.
 pub fn sample_picture(role: Role, drawn: Drawn) -> String {
     let mut drawing = Drawing::new("", 24.0, 12.0);
     sample(&mut drawing, role, drawn, [1.0, 6.0]);

@@ -1,4 +1,4 @@
-//! One panel as a drawing: frame, grid, ticks, and what stands in it.
+//! One panel as a drawing: frame, grid, ticks, and contents.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::place::Place;
@@ -10,19 +10,19 @@ const FRAME: Stroke<'_> = Stroke::new("frame", 1.0);
 const GRID: Stroke<'_> = Stroke::new("grid", 1.0);
 const MINOR: Stroke<'_> = Stroke::new("grid", 0.5);
 
-/// Height of a row of a list, px: a line of words, and its bar beneath.
+/// Height of a row of a list, px: a line of words with its bar below.
 pub const ROW: f64 = 42.0;
-/// Of a letter at the size of ticks, px.
+/// Width of a letter in tick labels, px.
 const LETTER: f64 = 6.6;
 
-/// The panel as a picture of its own for the page, `width` px wide.
+/// The panel as a separate picture for the page, `width` px wide.
 pub fn panel(panel: &Panel, name: &str, width: f64, meaning: &str) -> String {
-    // the page writes the title itself
+    // the page itself writes the title
     let untitled = Panel { title: String::new(), ..panel.clone() };
     drawing(&untitled, name, width).finish(meaning)
 }
 
-/// The panel as a drawing; `name` keeps its ids apart from all others of the page.
+/// The panel as a drawing; `name` makes its ids differ from all others of the page.
 pub fn drawing(panel: &Panel, name: &str, width: f64) -> Drawing {
     let rows = panel.height == Height::Rows;
     let left = if rows {
@@ -115,7 +115,7 @@ fn axes(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y
     for tick in x_ticks {
         let Some(at) = place.x.place(tick.value) else { continue };
         let half = 0.55 * LETTER * tick.label.chars().count() as f64;
-        // names give way where they would touch
+        // names that would touch the previous one are omitted
         let shown = !tick.label.is_empty() && at - half >= free;
         drawing.line([at, bottom], [at, bottom + if shown { 5.0 } else { 3.0 }], FRAME);
         if shown {

@@ -1,4 +1,4 @@
-//! Where a panel's values stand on the drawing.
+//! Maps a panel's values to positions on the drawing.
 
 use super::drawing::Area;
 use crate::report::scale::Scale;
@@ -9,6 +9,6 @@ pub struct Place {
     pub area: Area,
     /// The horizontal axis.
     pub x: Scale,
-    /// The upright axis.
+    /// The vertical axis.
     pub y: Scale,
 }

@@ -1,14 +1,15 @@
-//! A scene in space, seen from one side; the page turns it (`page/scene.js` is its twin).
+//! A scene in space, seen from one side; the page can rotate it (`page/scene.js` draws the same).
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::sign;
 use crate::report::figure::{Body, Marker, Scene};
 
-/// From where it is seen at first, rad: about the vertical, then down from the horizontal.
+/// Initial viewing direction, rad: about the vertical, then down from the horizontal.
 const YAW: f64 = 0.7;
 const PITCH: f64 = 0.35;
 
-/// A place on the picture (right, down, near), m: z runs to the right, y up, x towards the reader before it is turned.
+/// A position in the picture (right, down, near), m: before rotation, z points right, y up, x
+/// towards the reader.
 fn seen([x, y, z]: [f64; 3]) -> [f64; 3] {
     let (right, near) = (z * YAW.cos() - x * YAW.sin(), z * YAW.sin() + x * YAW.cos());
     [right, -(y * PITCH.cos() - near * PITCH.sin()), y * PITCH.sin() + near * PITCH.cos()]
@@ -26,7 +27,7 @@ pub fn draw(drawing: &mut Drawing, area: Area, scene: &Scene) {
         return;
     }
     let ([left, right], [top, bottom]) = (reach(0), reach(1));
-    // room for names beside the outermost places
+    // leave space for names next to the outermost positions
     let size = ((area.width - 120.0) / (right - left).max(1e-3))
         .min((area.height - 40.0) / (bottom - top).max(1e-3));
     let centre = [area.left + 0.5 * area.width, area.top + 0.5 * area.height];
@@ -63,7 +64,7 @@ pub fn draw(drawing: &mut Drawing, area: Area, scene: &Scene) {
         let free = places.into_iter().map(|by| [place[0] + by[0], place[1] + by[1]]).find(|[x, y]| {
             taken.iter().all(|t| x + width < t[0] || *x > t[2] || y + 2.0 < t[1] || y - 12.0 > t[3])
         });
-        // a name without a free place is told by the table
+        // a name that does not fit is only given in the table
         if let Some([x, y]) = free {
             taken.push([x, y - 12.0, x + width, y + 2.0]);
             drawing.text([x, y], Anchor::Start, "tick", &spot.name);

@@ -1,4 +1,4 @@
-//! The sign of a single point.
+//! The marker of a single point.
 
 use super::drawing::{Drawing, Stroke};
 use crate::report::figure::{Marker, Role};
@@ -6,7 +6,7 @@ use crate::report::figure::{Marker, Role};
 /// Radius of a point, px.
 pub const RADIUS: f64 = 4.0;
 
-/// The sign of a point.
+/// Draws the marker of a point.
 pub fn marker(drawing: &mut Drawing, at: [f64; 2], role: Role, marker: Marker) {
     let name = role.name();
     let stroke = format!("s-{name}");

@@ -1,4 +1,5 @@
-//! Whether the numbers may be believed: every check with its outcome, its meaning and its figures.
+//! The checks on which the credibility of the numbers rests: each with its outcome, its meaning and
+//! its figures.
 
 use crate::report::page::escaped;
 use crate::report::words;
@@ -49,7 +50,8 @@ pub fn checks(results: &Results) -> Option<String> {
     Some(html)
 }
 
-/// `series_stiffness_n_per_m`, 3.1e7 → `series stiffness 31.0 N/µm`; counts and ranks have no decimals.
+/// `series_stiffness_n_per_m`, 3.1e7 → `series stiffness 31.0 N/µm`; counts and ranks have no
+/// decimals.
 fn figure(name: &str, value: f64) -> String {
     const UNITS: [(&str, f64, &str); 6] = [
         ("_n_per_m", 1e-6, " N/µm"),

@@ -1,11 +1,11 @@
-//! How well the virtual points hold what was measured.
+//! Quality of the virtual points.
 
 use super::{Table, key, number, words};
 use crate::report::words::number::{decimals, short};
 use crate::results::Results;
 use std::collections::BTreeMap;
 
-/// How well the virtual points hold what was measured.
+/// Fraction of the measurement that the virtual points reproduce.
 pub fn virtual_points(results: &Results) -> Option<String> {
     if results.virtual_points.is_empty() {
         return None;

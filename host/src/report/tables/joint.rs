@@ -1,4 +1,5 @@
-//! Joint stiffness and damping by method, IDM set and band: behind a fold, what failed last, each with its reason in few words.
+//! Joint stiffness and damping by method, IDM set and band, in a collapsible section; rows that
+//! failed come last, each with a short reason.
 
 use super::{Cell, Table, interval, kind_of, number, remarks, scattered, words};
 use crate::report::page::escaped;
@@ -78,7 +79,7 @@ fn row(i: usize, joint: &Joint) -> Vec<Cell> {
     ]
 }
 
-/// Why a row identified nothing, in a few words; none where it did.
+/// A short reason why a row identified nothing; `None` if it did.
 pub fn verdict(joint: &Joint) -> Option<&'static str> {
     if joint.identified() {
         return None;
@@ -94,7 +95,7 @@ pub fn verdict(joint: &Joint) -> Option<&'static str> {
     })
 }
 
-/// What could not be applied, each kind of reason once.
+/// Methods that could not be applied, with each kind of reason listed once.
 pub fn refusals(results: &Results) -> Option<String> {
     if results.refused.is_empty() {
         return None;

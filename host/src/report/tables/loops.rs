@@ -1,4 +1,5 @@
-//! The contact by loops in numbers: kinds side by side (the paper's Tables 2 and 3), the decay's cycles, every level.
+//! The contact by loops in numbers: types of stiffness side by side (the paper's Tables 2 and 3),
+//! the cycles of the decay, all levels.
 
 use super::{Table, number, remarks, scattered, words};
 use crate::report::page::escaped;
@@ -7,7 +8,7 @@ use crate::report::words::number::{decimals, micro, short, with_scatter};
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, Shape};
 use std::fmt::Write;
 
-/// FBS and loops side by side, each with what it is.
+/// FBS and loops side by side, each with its meaning.
 pub fn side_by_side(results: &Results) -> Option<String> {
     if results.side_by_side.is_empty() {
         return None;
@@ -29,7 +30,8 @@ pub fn side_by_side(results: &Results) -> Option<String> {
     Some(html)
 }
 
-/// A cycle whose slope scatters by more than this part of it over the hits tells nothing of its own.
+/// If a cycle's slope scatters over the hits by more than this fraction of it, the cycle is not
+/// informative by itself.
 const UNSTEADY: f64 = 0.08;
 
 /// The decay's cycles after the hits: slope and phase of each.
@@ -65,7 +67,7 @@ pub fn decay(results: &Results) -> Option<String> {
     Some(table.finish())
 }
 
-/// What the corrected force was corrected by.
+/// The parameters of the force correction.
 pub fn static_arm(results: &Results) -> Option<String> {
     let arm = results.static_arm.as_ref()?;
     Some(format!("<p>{}</p>", escaped(said::static_arm(arm).trim_end_matches(':'))))
@@ -84,7 +86,7 @@ const HEADS: [&str; 10] = [
     "cycles",
 ];
 
-/// Loops: stiffness, energy, phase. Friction where something slips.
+/// Loops: stiffness, energy, phase, and friction if something slips.
 pub fn hysteresis(results: &Results) -> Option<String> {
     if results.hysteresis.is_empty() {
         return None;
@@ -154,7 +156,8 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     Some(html)
 }
 
-/// The shape in words. Of impacts it is what the decay's frequency tells; whether their loops are straight lines is another question.
+/// The shape in words. For impacts it comes from the decay's frequency, which does not determine
+/// whether the loops are straight lines.
 fn shape(h: &Hysteresis) -> String {
     let name = said::shape_name(h.shape);
     let opened =

@@ -1,4 +1,4 @@
-//! The tables: html text from results. Every number says where it stands in `results.json`.
+//! The tables: HTML text from results. Every number is marked with its path in `results.json`.
 
 mod checks;
 mod differences;
@@ -19,22 +19,23 @@ pub use recommended::recommended;
 use super::page::escaped;
 use std::fmt::Write;
 
-/// What stands where nothing is known.
+/// Text for an unknown value.
 pub(super) const UNKNOWN: &str = "–";
 
-/// One cell: words, or a number with its place in `results.json`; of several numbers the places in their order, with spaces between.
+/// One cell: words, or a number with its path in `results.json`; for several numbers, the paths in
+/// order, separated by spaces.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Cell {
     text: String,
     path: String,
 }
 
-/// Words.
+/// A cell with words.
 pub(super) fn words(text: impl Into<String>) -> Cell {
     Cell { text: text.into(), path: String::new() }
 }
 
-/// A number, or nothing where it is not known.
+/// A number, or a dash if it is not known.
 pub(super) fn number(text: Option<String>, path: impl Into<String>) -> Cell {
     match text {
         Some(text) => Cell { text, path: path.into() },
@@ -42,22 +43,22 @@ pub(super) fn number(text: Option<String>, path: impl Into<String>) -> Cell {
     }
 }
 
-/// A number with its scatter, both beside one another at `place`.
+/// A number with its scatter; both are in the object at `place`.
 pub(super) fn scattered(text: Option<String>, place: &str) -> Cell {
     number(text, format!("{place}/mean {place}/std"))
 }
 
-/// An interval that stands at `place`.
+/// An interval at `place`.
 pub(super) fn interval(text: Option<String>, place: &str) -> Cell {
     number(text, format!("{place}/0 {place}/1"))
 }
 
-/// A key of any name as a part of a path (RFC 6901), in which no space may stand.
+/// A key of any name, encoded as a part of a path (RFC 6901), in which spaces are not allowed.
 pub(super) fn key(name: &str) -> String {
     name.replace('~', "~0").replace('/', "~1").replace('%', "%25").replace(' ', "%20")
 }
 
-/// Builds one table; cells are escaped, columns after the first `text_columns` are set to the right.
+/// Builds one table; cells are escaped, columns after the first `text_columns` are right-aligned.
 pub(super) struct Table {
     html: String,
     text_columns: usize,
@@ -96,7 +97,7 @@ impl Table {
     }
 }
 
-/// Remarks, each kind once with the number of rows that it belongs to, and the first of them.
+/// Remarks grouped by kind, each with the number of rows that it applies to, and the first of them.
 pub(super) fn remarks(all: &[(String, &str)]) -> String {
     let mut kinds: Vec<(String, &str, Vec<&str>)> = Vec::new();
     for (row, remark) in all {
@@ -124,7 +125,7 @@ pub(super) fn remarks(all: &[(String, &str)]) -> String {
     html
 }
 
-/// A remark without its numbers: two that differ in nothing else are of one kind.
+/// A remark without its numbers: two remarks that differ only in numbers are of one kind.
 pub(super) fn kind_of(remark: &str) -> String {
     let mut kind = String::with_capacity(remark.len());
     for c in remark.chars() {

@@ -1,4 +1,4 @@
-//! What was measured, and where everything comes from.
+//! What was measured, and the provenance of the results.
 
 use super::{Table, key, number, words};
 use crate::report::page::escaped as escape;
@@ -44,7 +44,7 @@ pub fn completeness(results: &Results) -> Option<String> {
     Some(table.finish())
 }
 
-/// What was calibrated otherwise than device and plan say, and why; none where nothing was.
+/// Calibrations that differ from those of device and plan, and why; `None` if there are none.
 pub fn calibrations(results: &Results) -> Option<String> {
     let all = &results.source.calibrations;
     if all.is_empty() {
@@ -84,13 +84,13 @@ pub fn calibrations(results: &Results) -> Option<String> {
     Some(table.finish())
 }
 
-/// With five significant digits, as certificates have them.
+/// With five significant digits, as in calibration certificates.
 fn precise(value: f64) -> String {
     let places = 4 - value.abs().log10().floor().clamp(-10.0, 4.0) as i32;
     decimals(value, places.unsigned_abs() as usize)
 }
 
-/// Where everything comes from: file, device, settings, records, link.
+/// Provenance: file, device, settings, records, link.
 pub fn provenance(results: &Results) -> String {
     let source = &results.source;
     let mut rows: Vec<(String, String)> = vec![
@@ -127,7 +127,7 @@ fn spaced(name: &str) -> String {
     name.replace('_', " ")
 }
 
-/// Ranges of ids, the first dozen written out; all of them stand in results.json.
+/// Ranges of ids, the first dozen written out; results.json has all of them.
 fn listed(ranges: &[[i64; 2]]) -> String {
     let shown: Vec<String> = ranges
         .iter()

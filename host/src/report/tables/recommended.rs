@@ -1,4 +1,4 @@
-//! The estimates to quote, with their intervals, and what hits drawn anew say.
+//! The estimates to quote, with their intervals, and the result of the bootstrap over hits.
 
 use super::{Table, interval, number, words};
 use crate::report::page::escaped as escape;
@@ -7,7 +7,7 @@ use crate::report::words::number::{band, short};
 use crate::results::Results;
 use std::fmt::Write;
 
-/// The estimates to quote, with their intervals, and what hits drawn anew say.
+/// The estimates to quote, with their intervals, and the result of the bootstrap over hits.
 pub fn recommended(results: &Results) -> Option<String> {
     if results.recommended.is_empty() {
         return None;

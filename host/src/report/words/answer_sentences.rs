@@ -1,4 +1,4 @@
-//! The answer in words: what a colleague would say of each number.
+//! The answer in words: what an engineer would say about each number.
 
 use super::line::{BETWEEN, CLAMP, CONTACT, Line};
 use super::number::{micro, short};
@@ -12,7 +12,8 @@ pub fn with_interval(k: &Interval) -> String {
     format!("{} N/µm (95 % {}…{})", short(micro(k.mean)), short(micro(k.ci95[0])), short(micro(k.ci95[1])))
 }
 
-/// Why this k_T may be believed, and what makes its interval; `levels` of the shaker count beside the hits.
+/// Why this k_T is credible, and what determines its interval; `levels` is the number of shaker
+/// levels used in addition to the hits.
 pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
     let mut causes: Vec<(&Cause, &f64)> = budget.iter().collect();
     causes.sort_by(|a, b| b.1.total_cmp(a.1));
@@ -47,7 +48,7 @@ fn of_cause(cause: Cause) -> &'static str {
     }
 }
 
-/// Why a k_T that came out is not given.
+/// Why a fitted k_T is not reported.
 pub fn doubted(own: &Stiffness) -> String {
     let reasons: Vec<String> = own.doubts.iter().map(|doubt| of_doubt(*doubt, &own.diagnosis)).collect();
     format!(
@@ -83,7 +84,7 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
     .to_owned()
 }
 
-/// Where the number between the arms comes from.
+/// Source of the stiffness between the arms.
 pub fn between_the_arms(basis: Estimate) -> String {
     match basis {
         Estimate::Fit => {
@@ -96,29 +97,30 @@ pub fn between_the_arms(basis: Estimate) -> String {
     .into()
 }
 
-/// There is no k_T of a contact that slips.
+/// Sentence for a slipping contact, which has no k_T.
 pub fn slipping() -> String {
     "The contact slips under the hammer, so that its stiffness depends on the force: hit more softly, or press harder, for the stuck stiffness.".into()
 }
 
-/// What lies between the arms cannot be looked for.
+/// Sentence if the stiffness between the arms cannot be determined.
 pub fn without_all_three() -> String {
     "It needs FRFs of A, B and the assembly.".into()
 }
 
-/// The question was not put.
+/// Sentence if it was not requested.
 pub fn not_looked_for() -> String {
     "It was not looked for.".into()
 }
 
-/// An error's text as a sentence.
+/// An error message as a sentence.
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", letters.as_str())
 }
 
-/// Why the contact and what lies between the arms differ, in one sentence; none where one of them is not known.
+/// Why the stiffness of the contact and that between the arms differ, in one sentence; `None` if
+/// one of them is not known.
 pub fn why_they_differ(results: &Results) -> Option<Line> {
     let answer = results.answer.as_ref()?;
     let contact = answer.contact.k_t_n_per_m.as_ref()?.mean;
@@ -142,7 +144,7 @@ pub fn why_they_differ(results: &Results) -> Option<Line> {
     )
 }
 
-/// The answer's lines: what the terminal says first, and the head of the report.
+/// The answer's lines: the first lines on the terminal, and the head of the report.
 pub fn lines(results: &Results) -> Vec<String> {
     let Some(answer) = &results.answer else { return Vec::new() };
     let mut lines = vec![contact(answer)];
@@ -157,7 +159,7 @@ pub fn lines(results: &Results) -> Vec<String> {
         ));
     }
     lines.push(match answer.slip.found {
-        // the check below says how it was told
+        // the corresponding check states how this was determined
         Some(true) => "The contact slips under the hammer.".into(),
         Some(false) => "The contact sticks under the hammer.".into(),
         None => answer.slip.why.clone(),

@@ -1,4 +1,5 @@
-//! The answer in a few lines, for those who will read no more: the first screen and the end of the terminal's output.
+//! The answer in a few lines, for readers who read nothing else: the first screen and the end of
+//! the terminal's output.
 
 use super::answer_sentences::{why_they_differ, with_interval};
 use super::line::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
@@ -13,8 +14,8 @@ fn line(head: &str, text: impl Into<String>) -> Line {
     Line { head: head.into(), text: text.into(), numbers: Vec::new() }
 }
 
-/// On what was measured: a simulated rig is called so before anything else. What the structures are called follows, and where z points,
-/// where that is not as usual.
+/// What was measured; a simulated rig is identified as such first. The names of the structures
+/// follow, and the direction of z if it is not the usual one.
 pub fn on_what(results: &Results) -> String {
     let settings = &results.source.settings;
     let names = settings.get("structure").and_then(|names| names.as_str()).map(str::to_owned);
@@ -52,7 +53,7 @@ fn measured_on(results: &Results) -> String {
     }
 }
 
-/// The numbers that the user came for; none where no campaign was analysed.
+/// The main results; empty if no campaign was analysed.
 pub fn answer(results: &Results) -> Vec<Line> {
     let Some(answer) = &results.answer else { return Vec::new() };
     let own = &answer.contact;
@@ -93,7 +94,7 @@ pub fn answer(results: &Results) -> Vec<Line> {
     lines
 }
 
-/// A failed check in a few words, for those who never heard of it.
+/// A failed check in a few words, for readers unfamiliar with it.
 pub fn failed(check: &Check) -> String {
     let at = check.frequency_hz.map_or(String::new(), |f| format!(" at {} Hz", decimals(f, 0)));
     match check.name.as_str() {
@@ -116,10 +117,10 @@ pub fn failed(check: &Check) -> String {
     }
 }
 
-/// Most lines on the terminal.
+/// Maximum number of lines on the terminal.
 pub const MOST: usize = 15;
 
-/// What `demo` and `analyse` end with: at most [`MOST`] lines, of which the caller needs `after`.
+/// The last lines of `demo` and `analyse`: at most [`MOST`], of which the caller needs `after`.
 pub fn terminal(results: &Results, after: usize) -> Vec<String> {
     let mut lines = vec![on_what(results)];
     let answer = answer(results);
@@ -144,7 +145,7 @@ pub fn terminal(results: &Results, after: usize) -> Vec<String> {
         .filter(|c| c.ok == Some(false))
         .map(|c| format!("Look here: {}", failed(c)))
         .collect();
-    // what is missing keeps a line at least
+    // reserve at least one line for missing items
     let kept = usize::from(!results.missing.is_empty());
     let room = MOST.saturating_sub(lines.len() + after + kept);
     shortened(&mut lines, &failed, room, "checks failed");
@@ -154,7 +155,7 @@ pub fn terminal(results: &Results, after: usize) -> Vec<String> {
     lines
 }
 
-/// As many of `all` as there is room for; the last line counts the others.
+/// As many lines of `all` as fit; the last line counts the others.
 fn shortened(lines: &mut Vec<String>, all: &[String], room: usize, what: &str) {
     if all.len() <= room {
         lines.extend_from_slice(all);

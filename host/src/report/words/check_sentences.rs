@@ -1,4 +1,4 @@
-//! The checks, each with its outcome, its figures, and what it means for the reader.
+//! The checks, each with its outcome, its figures, and its meaning for the reader.
 
 use super::number::{decimals, micro, short};
 use crate::analyse::Findings;
@@ -17,7 +17,7 @@ use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
 use crate::substructuring::identify::Internals;
 
-/// All that were made.
+/// All checks that were made.
 pub fn all(found: &Findings) -> Vec<Check> {
     let mut checks = Vec::new();
     checks.extend(one_structure(&found.source.structure_changes));
@@ -36,7 +36,7 @@ pub fn all(found: &Findings) -> Vec<Check> {
     checks
 }
 
-/// That records of several structures were put together, where somebody accepted that.
+/// Records of several structures were combined because the user accepted that.
 fn one_structure(changes: &[String]) -> Option<Check> {
     let meaning = format!(
         "The campaign went on where the device told of another structure, because --new-structure was given ({}). If it was another one, nothing here is that of either.",
@@ -45,7 +45,7 @@ fn one_structure(changes: &[String]) -> Option<Check> {
     (!changes.is_empty()).then(|| Check::new(ONE_STRUCTURE, Some(false), meaning))
 }
 
-/// Which set of modes the CMIF suggests, and whether rigid motions are enough at all.
+/// The set of modes suggested by the CMIF, and whether rigid motions are sufficient.
 fn interface_modes(found: &Cmif) -> Check {
     let enough = rigid_motions_suffice(found);
     let mut meaning = format!("The CMIF suggests {} modes: {}.", found.suggested, found.reason);
@@ -353,7 +353,7 @@ mod tests {
         assert!((check.values["series_stiffness_n_per_m"] / 31.2e6 - 1.0).abs() < 1e-9);
         assert!(check.meaning.contains("not k_T") && check.meaning.contains("in series"));
         assert_eq!(check.values.len(), 8);
-        // an interval without an upper end is said, and is no number
+        // an interval without an upper end is stated in words, not as a number
         let open = SeriesCompliance::ClampGivesWay { sizes, compliance_m_per_n: 1e-9, std_m_per_n: 1e-8 };
         let open = series_compliance(&open);
         assert!(open.meaning.contains("…∞") && open.values.len() == 7, "{open:?}");

@@ -1,9 +1,10 @@
-//! What a comparison of two campaigns says.
+//! Sentences for the comparison of two campaigns.
 
 use crate::contact::Interval;
 use crate::results::Difference;
 
-/// Whether the contacts differ, by the quantity that tells; none where neither campaign's is known.
+/// Whether the contacts differ, by the quantity that decides it; a fixed sentence if neither
+/// quantity is known in both.
 pub fn verdict(told: Option<&Difference>) -> String {
     told.map_or_else(
         || {
@@ -14,7 +15,7 @@ pub fn verdict(told: Option<&Difference>) -> String {
     )
 }
 
-/// A quantity that one of the two lacks.
+/// Sentence for a quantity that one of the two lacks.
 pub fn lacking(quantity: &str, which: &str) -> String {
     format!("{quantity}: the {which} campaign has none")
 }
@@ -25,7 +26,7 @@ fn of_difference(d: &Difference) -> String {
     let part = 100.0 * mean / d.a.mean;
     if d.differ {
         let way = if mean > 0.0 { "stiffer" } else { "softer" };
-        // the smaller change first, whichever way it goes
+        // the smaller change first, whatever its sign
         let [near, far] = if mean > 0.0 { [low, high] } else { [-high, -low] };
         format!(
             "They differ: {}, the second is {way} by {:.1} N/µm (95 % {:.1}…{:.1}), {:.0} % of the first.",

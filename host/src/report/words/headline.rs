@@ -1,4 +1,4 @@
-//! The number that `identify` was asked for, as its first line.
+//! The first line of `identify`: the number that was requested.
 
 use super::answer_sentences::with_interval;
 use super::number::{band, stiffness};
@@ -7,7 +7,7 @@ use crate::contact::Interval;
 use crate::results::{Joint, Results, headline_rank};
 use crate::substructuring::{Dof, fit};
 
-/// All that was found in one line: the answer of a campaign, else the first number of anything else.
+/// The main result in one line: the answer of a campaign, otherwise the first number available.
 pub fn of(results: &Results) -> String {
     let answer = brief::answer(results).into_iter().next();
     answer
@@ -17,8 +17,9 @@ pub fn of(results: &Results) -> String {
         .unwrap_or_else(|| "no stiffness was found".into())
 }
 
-/// The stiffness along the sliding direction, by the best of what was found: the fit where it was asked for, then the recommended
-/// estimate, then single methods. None where no method identified it.
+/// The stiffness along the sliding direction, from the best available source: the fit if it was
+/// requested, then the recommended estimate, then single methods. `None` if no method identified
+/// it.
 pub fn between_the_arms(results: &Results) -> Option<String> {
     let said = fitted(results).or_else(|| recommended(results)).or_else(|| by_one_method(results))?;
     Some(format!("k_z between the arms: {said}."))
@@ -55,7 +56,7 @@ fn with_scatter(row: &Joint, mean: f64, std: f64) -> String {
     format!("{} (scatter of {lines} lines), {method} with {idms} IDMs, {band}", stiffness(mean, std))
 }
 
-/// Of the rows that identified it and pass `wanted`, the first band's best.
+/// Of the rows that identified it and satisfy `wanted`, the best one in the first band.
 fn best(results: &Results, wanted: impl Fn(&Joint) -> bool) -> Option<&Joint> {
     let rows = || results.joint.iter().filter(|row| row.identified() && wanted(row));
     let first = rows().next()?.band_hz;

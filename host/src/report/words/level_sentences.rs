@@ -1,4 +1,4 @@
-//! What a level of the shaker says of the contact's own stiffness, or why it says nothing.
+//! Sentences on the contact stiffness from a level of the shaker, or why there is none.
 
 use super::names::shape_name;
 use super::number::short;
@@ -7,7 +7,8 @@ use crate::analyse::NoLevelStiffness;
 use crate::contact::Shares;
 use crate::hysteresis::Shape;
 
-/// What makes a level's interval; `correction` is the part of T/Δx at the spots that is not the contact's.
+/// Contributions to a level's interval; `correction` is the part of T/Δx at the measured points
+/// that is not due to the contact.
 pub fn corrected(shares: &Shares, correction: f64) -> String {
     let mut causes = [
         (shares.fit, "what the hits tell of spots, points, gains and force"),

@@ -1,44 +1,44 @@
-//! A line of the answer, whose numbers say where they stand in `results.json`.
+//! A line of the answer, whose numbers are marked with their paths in `results.json`.
 
 use super::number::{micro, short};
 use crate::contact::Interval;
 
-/// How a line begins that has no number.
+/// Start of a line without a number.
 pub const UNKNOWN: &str = "not known.";
 
-/// What the truth of a simulated rig is announced by.
+/// Label of the true value of a simulated rig.
 pub const TRUTH: &str = "SIMULATED rig, its truth:";
 
-/// Where the answers stand.
+/// Paths of the answers.
 pub const CONTACT: &str = "/answer/contact/k_t_n_per_m";
 /// See [`CONTACT`].
 pub const BETWEEN: &str = "/answer/between_arms/k_n_per_m";
 /// See [`CONTACT`].
 pub const CLAMP: &str = "/answer/clamp/k_n_per_m";
 
-/// One line: what it is about, and what is said of it.
+/// One line: its subject, and the statement about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
-    /// What it is about; may be empty.
+    /// The subject; may be empty.
     pub head: String,
-    /// What is said.
+    /// The statement.
     pub text: String,
-    /// The numbers in it, in their order, each with its place in `results.json`.
+    /// The numbers in it, in order, each with its path in `results.json`.
     pub numbers: Vec<(String, String)>,
 }
 
 impl Line {
-    /// Whether it tells a simulated rig's truth, which nobody measured.
+    /// Whether it is the true value of a simulated rig, which was not measured.
     pub fn is_truth(&self) -> bool {
         self.head == TRUTH
     }
 
-    /// Words without a head and without numbers that stand elsewhere.
+    /// A line without subject and without numbers from `results.json`.
     pub fn words(text: String) -> Self {
         Line { head: String::new(), text, numbers: Vec::new() }
     }
 
-    /// The same with the numbers of an interval at `place`, as `N/µm (95 % low…high)`.
+    /// Adds the numbers of an interval at `place`, as in `N/µm (95 % low…high)`.
     #[must_use]
     pub fn interval(mut self, k: &Interval, place: &str) -> Self {
         for (value, field) in [(k.mean, "mean"), (k.ci95[0], "ci95/0"), (k.ci95[1], "ci95/1")] {
@@ -47,7 +47,7 @@ impl Line {
         self
     }
 
-    /// The same with a stiffness, N/m, as it is written in N/µm.
+    /// Adds a stiffness, N/m, as it is written in N/µm.
     #[must_use]
     pub fn stiffness(mut self, value: f64, place: &str) -> Self {
         self.numbers.push((short(micro(value)), place.to_owned()));

@@ -1,10 +1,10 @@
-//! What an analysis had to do without, in sentences.
+//! Sentences for data that were missing in an analysis.
 
 use crate::analyse::{CellName, Missing};
 use crate::results::rounded;
 use crate::structure::Structure;
 
-/// One sentence.
+/// The sentence for one missing item.
 pub fn sentence(missing: &Missing) -> String {
     match missing {
         Missing::Records { cell, told } => of_cell(cell, told),
@@ -68,7 +68,7 @@ fn cells(count: usize) -> String {
     format!("{count} {}", if count == 1 { "cell" } else { "cells" })
 }
 
-/// Of a configuration whose FRFs came from elsewhere.
+/// Sentence for a configuration whose FRFs were imported.
 pub fn imported(configuration: Structure, file: &str) -> String {
     format!(
         "{configuration}: its FRFs were imported from {file}: without hits there are no coherence and no loops."

@@ -1,4 +1,5 @@
-//! What the report and the terminal say: findings and results in plain sentences, numbers with few digits.
+//! Text of the report and the terminal: findings and results in plain sentences, numbers with few
+//! digits.
 
 pub(super) mod answer_sentences;
 pub mod brief;

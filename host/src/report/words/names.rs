@@ -1,23 +1,24 @@
-//! What methods, shapes, excitations and outcomes are called.
+//! Names of methods, shapes, excitations and outcomes.
 
 use super::number::{decimals, short};
 use crate::hysteresis::static_arm::Basis;
 use crate::results::{Excitation, Force, Hysteresis, Identified, OverCycles, Shape};
 
-/// What the slope between the spots is called.
+/// Name of the slope between the measured points.
 pub const BETWEEN_SPOTS: &str = "slope between the spots";
 
-/// A loop whose Δx lags T by more is no line: the phase from which a steady loop is called an ellipse, °.
+/// Phase between Δx and T from which a steady loop counts as an ellipse rather than a line, °.
 pub const TURNED_DEG: f64 = 10.0;
 
-/// The slope that may be quoted for a loop, with its name: that of the stick part where it has one, k_eq otherwise.
+/// The slope that may be quoted for a loop, with its name: that of the stick part if it has one,
+/// otherwise k_eq.
 pub fn slope(loops: &Hysteresis) -> Option<(&'static str, OverCycles)> {
     let between = loops.slope_between_spots_n_per_m.map(|k| (BETWEEN_SPOTS, k));
     let whole = loops.k_eq_n_per_m.map(|k| ("k_eq", k));
     loops.k_t_n_per_m.map(|k| ("k_T", k)).or(between).or(whole)
 }
 
-/// The method as a tribologist would call it.
+/// Name of the method for readers.
 pub fn method(name: &str) -> &str {
     match name {
         "internal" => "Eq. 3 in least squares",
@@ -35,7 +36,7 @@ pub fn method(name: &str) -> &str {
     }
 }
 
-/// What the corrected force was corrected by, and how that is known.
+/// The parameters of the force correction, and how they were determined.
 pub fn static_arm(arm: &Identified) -> String {
     let basis = match arm.basis {
         Basis::Given => "as stated",
@@ -49,7 +50,7 @@ pub fn static_arm(arm: &Identified) -> String {
     )
 }
 
-/// A loop's shape by its name in files.
+/// Name of a loop's shape, from its name in files.
 pub fn shape_name(shape: Shape) -> &'static str {
     match shape {
         Shape::Stuck => "stuck",
@@ -59,7 +60,7 @@ pub fn shape_name(shape: Shape) -> &'static str {
     }
 }
 
-/// Which excitation and force a row of loops is about.
+/// Excitation and force of a row of loops.
 pub fn excitation(loops: &Hysteresis) -> String {
     let mut words = match (loops.kind, loops.frequency_hz) {
         (Excitation::Impact, _) => "impacts, first cycle".into(),
@@ -76,7 +77,7 @@ pub fn excitation(loops: &Hysteresis) -> String {
     words
 }
 
-/// A check's outcome in a word.
+/// A check's outcome in one or two words.
 pub fn outcome(ok: Option<bool>) -> &'static str {
     match ok {
         Some(true) => "passed",

@@ -1,4 +1,4 @@
-//! Numbers as people read them: few digits, units beside them, N/µm for stiffness.
+//! Formats numbers for readers: few digits, with units, N/µm for stiffness.
 
 use crate::substructuring::Band;
 
@@ -7,11 +7,11 @@ pub fn short(value: f64) -> String {
     decimals(value, places(value, 3))
 }
 
-/// `mean ± std`, both with the decimals that the mean's three or the scatter's two digits need, whichever
-/// is fewer; never `26.8134 ± 4`.
+/// `mean ± std`, both with the number of decimals that shows three digits of the mean or two of the
+/// scatter, whichever is fewer; never `26.8134 ± 4`.
 pub fn with_scatter(mean: f64, std: f64) -> String {
     let few = places(mean, 3).min(places(std, 2));
-    // a scatter that is not zero is not shown as zero
+    // a nonzero scatter must not be shown as zero
     let places = if std > 0.0 { few.max(places(std, 1).min(few + 2)) } else { few };
     format!("{} ± {}", decimals(mean, places), decimals(std, places))
 }
@@ -31,7 +31,7 @@ pub fn band(band: Band) -> String {
     format!("{}–{} Hz", short(band.low_hz), short(band.high_hz))
 }
 
-/// With the thousands apart: 12 345.
+/// With thousands separated: 12 345.
 pub fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::new();
@@ -44,17 +44,17 @@ pub fn count(n: u64) -> String {
     text
 }
 
-/// A value with the decimal prefix that leaves 1 to 1000 of it.
+/// A value with the metric prefix that puts it between 1 and 1000.
 pub fn prefixed(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 7] =
         [(1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p")];
-    // 999.6 µm is 1.00 mm
+    // so that 999.6 µm becomes 1.00 mm
     let size = value.abs() * 1.0005;
     let (factor, prefix) = PREFIXES.into_iter().find(|(factor, _)| size >= *factor).unwrap_or((1.0, ""));
     format!("{} {prefix}{unit}", short(value / factor))
 }
 
-/// A length with its scatter, in the prefix of the length.
+/// A length with its scatter, with the prefix of the length.
 pub fn length(mean_m: f64, std_m: f64) -> String {
     let (factor, unit) = if mean_m.abs() >= 1e-3 { (1e3, "mm") } else { (1e6, "µm") };
     format!("{} {unit}", with_scatter(factor * mean_m, factor * std_m))
@@ -65,14 +65,14 @@ fn places(value: f64, significant: i32) -> usize {
         return significant.max(1) as usize - 1;
     }
     let places = |value: f64| (significant - 1 - value.abs().log10().floor() as i32).clamp(0, 12);
-    // 0.09998 is 0.100 when it is rounded, not 0.1000
+    // 0.09998 rounds to 0.100, not 0.1000
     let scale = 10f64.powi(places(value));
     let rounded = (value * scale).round() / scale;
-    // a zero has no scale: nothing is left of the value within the decimals that there are
+    // the value rounds to zero at the available decimals, so it is shown as 0
     if rounded == 0.0 { 0 } else { places(rounded) as usize }
 }
 
-/// `value` with this many decimals and a true minus sign; a dash when it is no number.
+/// `value` with this many decimals and a typographic minus sign; a dash if it is not finite.
 pub fn decimals(value: f64, places: usize) -> String {
     if !value.is_finite() {
         return "–".into();

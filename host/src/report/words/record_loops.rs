@@ -1,11 +1,11 @@
-//! What `jointrig hysteresis` prints of one time record: every figure of its loop, and what is wrong with it.
+//! Output of `jointrig hysteresis` for one time record: every figure of its loop, and its faults.
 
 use super::names::{BETWEEN_SPOTS, shape_name};
 use super::number::{decimals, prefixed, short, stiffness};
 use super::warning_sentences::loop_finding;
 use crate::results::{BESIDE_THE_CONTACT, Excitation, Force, Hysteresis, Results, Shape};
 
-/// The loops of a record, line by line; nothing where there are none.
+/// The loops of a record, line by line; empty if there are none.
 pub fn record_loops(results: &Results) -> Vec<String> {
     let beside = results.source.settings.contains_key(BESIDE_THE_CONTACT);
     results.hysteresis.iter().flat_map(|row| of_row(row, beside)).collect()
@@ -66,7 +66,7 @@ fn of_row(row: &Hysteresis, beside: bool) -> Vec<String> {
     lines.extend(
         row.findings.iter().zip(&findings).map(|(found, said)| format!("!! {}: {said}", found.name())),
     );
-    // the warnings hold the findings' sentences too
+    // the warnings also contain the findings' sentences, which are already printed
     lines
         .extend(row.warnings.iter().filter(|said| !findings.contains(said)).map(|said| format!("!! {said}")));
     lines
@@ -81,7 +81,8 @@ fn in_words(shape: Shape) -> &'static str {
     }
 }
 
-/// What the shaker's slopes are called: k_T in a record of the contact itself, the slope between the spots everywhere else.
+/// Name of the shaker's slopes: k_T in a record of the contact itself, otherwise the slope between
+/// the measured points.
 pub(super) fn slope_name(rows: &[&Hysteresis]) -> &'static str {
     let contact = |row: &&Hysteresis| row.slope_between_spots_n_per_m.is_none() && row.level.is_none();
     let mut with = rows.iter().copied().filter(|row| row.stick_slope().is_some()).peekable();

@@ -1,4 +1,5 @@
-//! FBS and loops side by side (the paper's Tables 2 and 3): every kind of stiffness that was found, and what it is.
+//! FBS and loops side by side (the paper's Tables 2 and 3): every type of stiffness that was found,
+//! and its meaning.
 
 use super::names::{BETWEEN_SPOTS, slope};
 use super::number::{band, count, decimals, short};
@@ -9,10 +10,10 @@ use crate::results::{
 };
 use crate::substructuring::{Dof, fit};
 
-/// Which cycle of the decay stands for the later ones, as in the paper.
+/// The cycle of the decay that represents the later ones, as in the paper.
 const LATER_CYCLE: usize = 4;
 
-/// Every kind that these results hold, FBS first.
+/// Every type of stiffness in these results, FBS first.
 pub fn kinds(results: &Results) -> Vec<Kind> {
     let mut kinds = substructuring(results);
     kinds.extend(direct(results));
@@ -21,7 +22,7 @@ pub fn kinds(results: &Results) -> Vec<Kind> {
     kinds
 }
 
-/// The loops with the corrected force, the shaker's by frequency.
+/// The loops with the corrected force, those of the shaker by frequency.
 pub fn corrected(results: &Results) -> Vec<Kind> {
     let mut kinds = shaker(results, Force::Corrected);
     let of_impacts = |h: &&Hysteresis| h.kind == Excitation::Impact && h.force == Force::Corrected;
@@ -36,8 +37,8 @@ pub fn corrected(results: &Results) -> Vec<Kind> {
     kinds
 }
 
-/// The recommended estimate, the fit, and the paper's method, as far as they are there: each sees the same thing, and only the first two
-/// know how well.
+/// The recommended estimate, the fit, and the paper's method, if available: all three measure the
+/// same quantity, but only the first two give an uncertainty.
 fn substructuring(results: &Results) -> Vec<Kind> {
     let series = results.check(SERIES_COMPLIANCE).and_then(|c| c.ok);
     let what = match series {
@@ -93,7 +94,8 @@ fn direct(results: &Results) -> Option<Kind> {
     })
 }
 
-/// The steady loops of each frequency with this force: the straight ones' slope between the spots, and the others' k_eq.
+/// The steady loops of each frequency with this force: for straight ones the slope between the
+/// measured points, for others k_eq.
 fn shaker(results: &Results, force: Force) -> Vec<Kind> {
     let rows: Vec<&Hysteresis> =
         results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == force).collect();
@@ -115,7 +117,7 @@ fn shaker(results: &Results, force: Force) -> Vec<Kind> {
                 found: format!("{name}, shaker, {} Hz, {levels}", short(f)),
                 mean_n_per_m: mean,
                 std_n_per_m: std,
-                // one that slips tells what all of them are: slopes of stick parts
+                // if one loop slips, its meaning applies to all: slopes of stick parts
                 meaning: own.iter().max_by_key(|h| slips(h)).map_or(String::new(), |h| meaning(h, results)),
             });
         }

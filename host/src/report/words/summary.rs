@@ -1,4 +1,4 @@
-//! The same results in plain sentences, for the terminal and for the head of the report.
+//! The same results in plain sentences, for the terminal and the head of the report.
 
 use super::names::{method, slope, static_arm};
 use super::number::{band, count, micro, short, stiffness};
@@ -7,7 +7,8 @@ use super::{answer_sentences, side_by_side};
 use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND, RECORD, Results, Shape};
 use crate::substructuring::{Dof, fit};
 
-/// What FBS found between the arms, in one sentence: the recommended estimate, or else the headline's method.
+/// The FBS result between the arms, in one sentence: the recommended estimate, otherwise the
+/// headline's method.
 pub fn substructuring(results: &Results) -> Option<String> {
     recommended(results).or_else(|| by_one_method(results))
 }
@@ -45,7 +46,7 @@ fn by_one_method(results: &Results) -> Option<String> {
     ))
 }
 
-/// What drawing the hits anew said of the sliding direction.
+/// The bootstrap result for the sliding direction.
 pub fn bootstrapped(bootstrap: &Bootstrap) -> String {
     let z = bootstrap.hits.get(&Dof::Z).zip(bootstrap.joint.get(&Dof::Z));
     let said = z.map_or_else(
@@ -66,7 +67,7 @@ pub fn bootstrapped(bootstrap: &Bootstrap) -> String {
     )
 }
 
-/// What the loops of the impacts found, in one sentence.
+/// The result of the impact loops, in one sentence.
 pub fn impact_loops(results: &Results) -> Option<String> {
     let loops = results.impact_loops()?;
     let (name, k) = slope(loops)?;
@@ -81,7 +82,8 @@ pub fn impact_loops(results: &Results) -> Option<String> {
     ))
 }
 
-/// What the shaker's loops found, in one sentence: the slope between the spots where they stick, with its range over frequency and amplitude.
+/// The result of the shaker's loops, in one sentence: the slope between the measured points where
+/// they stick, with its range over frequency and amplitude.
 pub fn shaker_loops(results: &Results) -> Option<String> {
     let rows: Vec<&Hysteresis> =
         results.hysteresis.iter().filter(|h| h.kind == Excitation::Shaker && h.force == Force::Raw).collect();
@@ -107,7 +109,7 @@ pub fn shaker_loops(results: &Results) -> Option<String> {
     }
 }
 
-/// What the shaker's levels say of the contact itself.
+/// The results of the shaker's levels for the contact itself.
 pub fn levels_at_the_contact(results: &Results) -> Option<String> {
     let asked: Vec<&Hysteresis> = results.hysteresis.iter().filter(|h| h.k_t_why.is_some()).collect();
     let values: Vec<f64> = asked.iter().filter_map(|h| h.k_t_n_per_m).map(|k| micro(k.mean)).collect();
@@ -137,7 +139,7 @@ fn joint_line(joint: &Joint) -> Option<String> {
         .map_or(String::new(), |[low, high]| format!(", 95 % {}…{}", short(micro(low)), short(micro(high))));
     let noise = joint.noise_n_per_m.get("z");
     let verdict = if joint.identified() { "" } else { "; not identified" };
-    // the fit takes all lines at once
+    // the fit uses all lines together
     let spread = if joint.method == fit::NAME {
         format!("σ of the estimate from {} lines", joint.lines)
     } else {
@@ -153,7 +155,7 @@ fn joint_line(joint: &Joint) -> Option<String> {
     ))
 }
 
-/// The whole summary, line by line, as `demo` and `analyse` print it.
+/// The whole summary, line by line, as printed by `demo` and `analyse`.
 pub fn summary(results: &Results) -> Vec<String> {
     if results.source.kind == RECORD {
         return record_loops(results);
@@ -188,7 +190,7 @@ pub fn summary(results: &Results) -> Vec<String> {
         lines.push(String::new());
         lines.push(bootstrapped(bootstrap));
     }
-    // a campaign is analysed in every way: the main band is enough to read here
+    // a campaign is analysed in every way: print only the main band
     let read_here = |j: &&Joint| results.source.kind != "campaign" || j.band_hz == MAIN_BAND || j.idms == 0;
     let table: Vec<String> = results.joint.iter().filter(read_here).filter_map(joint_line).collect();
     if !table.is_empty() {

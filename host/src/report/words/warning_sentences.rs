@@ -1,14 +1,14 @@
-//! What a reader must know before using a number.
+//! Warnings that a reader must know before using a number.
 
 use super::number::{decimals, length, micro, prefixed, short};
 use crate::analyse::{ImpactLoops, NoFit, SlopeIs};
 use crate::hysteresis::LoopFinding;
 use crate::substructuring::direct::Direct;
 
-/// Noise above this part of the stiffness is told.
+/// Noise above this fraction of the stiffness is reported.
 const LOUD: f64 = 0.3;
 
-/// That noise alone moves a line by much of what the lines say; both in N/m.
+/// Warns if noise alone changes a line by a large fraction of the stiffness; both in N/m.
 pub fn loud_noise(median: f64, noise: f64) -> Option<String> {
     (noise > LOUD * median.abs()).then(|| {
         format!(
@@ -19,7 +19,7 @@ pub fn loud_noise(median: f64, noise: f64) -> Option<String> {
     })
 }
 
-/// What T/Δx is, and is not.
+/// What T/Δx measures, and what it does not.
 pub fn direct(found: &Direct) -> Vec<String> {
     let mut warnings = vec![
         "T is the load cells' sum, not the force at the contact: the static arm's inertia adds some per cent, growing with the frequency's square".to_owned(),
@@ -30,7 +30,7 @@ pub fn direct(found: &Direct) -> Vec<String> {
     warnings
 }
 
-/// What the slope of first cycles is, and what it may be called.
+/// What the slope of first cycles measures, and what it may be called.
 pub fn impact_loops(found: &ImpactLoops) -> Vec<String> {
     let mut warnings = vec![
         "Slope over the first cycle of a decay: every mode that the hit excites is in it, also the specimen's tilt on its clamp.".to_owned(),
@@ -66,12 +66,12 @@ fn hertz(frequency_hz: f64) -> String {
     decimals(frequency_hz, if frequency_hz < 10.0 { 4 } else { 2 })
 }
 
-/// So many cycles.
+/// A number of cycles in words.
 fn cycles(count: usize) -> String {
     if count == 1 { "1 cycle".into() } else { format!("{count} cycles") }
 }
 
-/// What a loop shows that must not pass in silence.
+/// The sentence for a finding on a loop.
 pub fn loop_finding(found: &LoopFinding) -> String {
     let micros = |s: f64| short(1e6 * s);
     match *found {
@@ -137,7 +137,7 @@ pub fn loop_finding(found: &LoopFinding) -> String {
     }
 }
 
-/// What a resonance of one specimen does to a loop that still looks stuck.
+/// The effect of a resonance of one specimen on a loop that still looks stuck.
 pub fn beside_resonance(frequency_hz: f64, resonance_hz: f64) -> String {
     let (way, effect) = if frequency_hz < resonance_hz { ("adds to", "low") } else { ("takes from", "high") };
     format!(
