@@ -38,7 +38,7 @@ pub(crate) fn megabytes(bytes: u64) -> String {
 /// Opens a file; returns it with its size in bytes.
 ///
 /// # Errors
-/// The operating system's; [`ErrorKind::Unsupported`] for a pipe, a socket or a device.
+/// An error of the operating system; [`ErrorKind::Unsupported`] for a pipe, a socket or a device.
 pub(crate) fn open(path: &Path) -> io::Result<(File, u64)> {
     // before the file is opened: opening a pipe waits until another process writes to it
     refuse_what_is_no_file(&std::fs::metadata(path)?)?;

@@ -1,4 +1,5 @@
-//! The host side of jointrig: device sessions, campaigns, spectra, substructuring, hysteresis, report.
+//! The host side of jointrig: device sessions, campaigns, spectra, substructuring, hysteresis,
+//! report.
 //!
 //! Data flows one way: [`device`] sessions deliver records, [`campaign`] stores them, [`spectra`]
 //! computes FRFs from them, and [`substructuring`] and [`hysteresis`] compute the joint's stiffness

@@ -45,7 +45,7 @@ pub enum DeviceError {
     Open {
         /// The device.
         address: String,
-        /// Why, and what to do.
+        /// The cause, and what to do.
         why: String,
     },
     /// The link broke while in use.

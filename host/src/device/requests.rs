@@ -111,7 +111,7 @@ impl Session {
         }
     }
 
-    /// Every channel of the scan. The id of the map is 0; [`Session::start`] begins the stream.
+    /// Requests the description of every channel of the scan. The map's id is 0.
     pub fn channels(&mut self, info: &Info) -> Result<ChannelMap, DeviceError> {
         let mut channels = Vec::with_capacity(info.channels.into());
         for index in 0..info.channels {
@@ -203,7 +203,8 @@ impl Session {
     /// counters.
     ///
     /// # Errors
-    /// A broken link, or missing scans that never came.
+    /// A broken link, a restarted device, or missing scans that do not arrive
+    /// (see [`Session::wait_for`]).
     pub fn finish(&mut self) -> Result<Accounts, DeviceError> {
         let Some(stream) = &self.inbox.stream else { return Ok(Accounts::default()) };
         let epoch = stream.epoch();

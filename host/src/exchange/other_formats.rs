@@ -178,7 +178,7 @@ fn said(path: &Path, first: &[u8], wanted: Contents) -> Option<String> {
 /// file.
 ///
 /// # Errors
-/// The operating system's.
+/// An error of the operating system.
 pub(super) fn not_read_here(path: &Path, wanted: Contents) -> io::Result<Option<String>> {
     let mut first = Vec::new();
     foreign::open(path).and_then(|(file, _)| file.take(LOOKED_AT).read_to_end(&mut first))?;
