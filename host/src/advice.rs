@@ -1,9 +1,10 @@
-//! What to do next: the half of a message that the operating system leaves out, and paths as a command takes them.
+//! Advice that completes an operating system's error message with what to do next, and quoting of
+//! paths for a shell.
 
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
-/// For a file that is read.
+/// Advice for a file that could not be read.
 pub(crate) fn reading(error: &Error) -> &'static str {
     match error.kind() {
         ErrorKind::NotFound => "check the name and the folder",
@@ -18,7 +19,7 @@ pub(crate) fn reading(error: &Error) -> &'static str {
     }
 }
 
-/// For a file or folder that is made.
+/// Advice for a file or folder that could not be created or written.
 pub(crate) fn writing(error: &Error) -> &'static str {
     match error.kind() {
         ErrorKind::NotFound => "make the folder that it lies in first",
@@ -35,9 +36,9 @@ pub(crate) fn writing(error: &Error) -> &'static str {
     }
 }
 
-/// A path as a shell takes it: quoted where it must be.
+/// A path as a shell accepts it, quoted where needed.
 pub fn quoted(path: &Path) -> String {
     let text = path.to_string_lossy();
-    // only a path with a byte of zero cannot be quoted, and no file has one
+    // only a path with a NUL byte cannot be quoted, and no file has one
     shlex::try_quote(&text).map_or_else(|_| text.to_string(), |quoted| quoted.to_string())
 }

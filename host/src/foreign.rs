@@ -1,24 +1,25 @@
-//! Files that others made, opened in one place: regular files only, and no more of them than their reader can use.
+//! Opens and reads files that other programs wrote: regular files only, each up to a size limit.
 //!
-//! A pipe would be waited for, and `/dev/zero` never ends; a file of settings as large as a disk is no file of settings. What is read is
-//! what the file held when it was opened: one that goes on growing is refused, not followed.
+//! Reading a pipe could wait forever, `/dev/zero` never ends, and a settings file as large as a
+//! disk is not a settings file. Only the size that a file has when it is opened is read; a file
+//! that grows while it is read is refused.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// Most bytes of a file of settings: a plan, a rig, a geometry, a calibration.
+/// Largest settings file (plan, rig, geometry, calibration), bytes.
 pub(crate) const SETTINGS: u64 = 1 << 20;
 
-/// Most bytes of a table as text.
+/// Largest text table, bytes.
 pub(crate) const TABLE: u64 = 8 << 20;
 
-/// Most bytes of a universal file, which is read as a whole.
+/// Largest universal file, bytes; it is read as a whole.
 pub(crate) const UNIVERSAL: u64 = 2 << 30;
 
-/// What was allocated for a file may be so many times its size …
+/// The contents of a file may take `TIMES` its size in memory …
 const TIMES: u64 = 4;
-/// … and this besides: small files may be compressed well.
+/// … plus this, bytes, because small files may be highly compressed.
 const BESIDE: u64 = 32 << 20;
 
 /// Most bytes of memory that the contents of a file of `size` bytes may take.
@@ -26,7 +27,7 @@ pub(crate) fn memory_for(size: u64) -> u64 {
     size.saturating_mul(TIMES).saturating_add(BESIDE)
 }
 
-/// A count of bytes, for people.
+/// Formats a number of bytes for a message.
 pub(crate) fn megabytes(bytes: u64) -> String {
     match bytes {
         0..1_000_000 => format!("{} kB", bytes.div_ceil(1000)),
@@ -34,12 +35,12 @@ pub(crate) fn megabytes(bytes: u64) -> String {
     }
 }
 
-/// Opens a file and says how many bytes it has.
+/// Opens a file; returns it with its size in bytes.
 ///
 /// # Errors
-/// The operating system's; [`ErrorKind::Unsupported`] for a pipe, a socket or a device.
+/// An error of the operating system; [`ErrorKind::Unsupported`] for a pipe, a socket or a device.
 pub(crate) fn open(path: &Path) -> io::Result<(File, u64)> {
-    // before it is opened: opening a pipe waits for somebody who writes into it
+    // before the file is opened: opening a pipe waits until another process writes to it
     refuse_what_is_no_file(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
     let there = file.metadata()?;
@@ -60,10 +61,11 @@ fn refuse_what_is_no_file(there: &std::fs::Metadata) -> io::Result<()> {
     Ok(())
 }
 
-/// All bytes of a file of at most `most`.
+/// Reads all bytes of a file of at most `most` bytes.
 ///
 /// # Errors
-/// As [`open`]; [`ErrorKind::FileTooLarge`] for a larger one, and for one that grows.
+/// As [`open`]; [`ErrorKind::FileTooLarge`] for a larger file, and for one that grows while it is
+/// read.
 pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let (file, size) = open(path)?;
     let too_large = |what: String| Err(io::Error::new(ErrorKind::FileTooLarge, what));
@@ -78,10 +80,10 @@ pub(crate) fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The same as text.
+/// Reads a file of at most `most` bytes as text.
 ///
 /// # Errors
-/// As [`bytes`]; [`ErrorKind::InvalidData`] with the line that is no UTF-8.
+/// As [`bytes`]; [`ErrorKind::InvalidData`] with the number of the line that is not valid UTF-8.
 pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(bytes(path, most)?).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];

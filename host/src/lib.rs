@@ -1,9 +1,11 @@
-//! The host side of jointrig: device sessions, campaigns, spectra, substructuring, hysteresis, report.
+//! The host side of jointrig: device sessions, campaigns, spectra, substructuring, hysteresis,
+//! report.
 //!
-//! Data flows one way: records come from [`device`] sessions, [`campaign`] keeps them, [`spectra`]
-//! turns them into FRFs, [`substructuring`] and [`hysteresis`] turn those into the joint's stiffness. [`analyse`] calls
-//! them for a campaign and returns findings, [`report`] makes the document [`results`] of those and shows it. The analysis
-//! rooms know nothing of devices, files or screens: arrays and geometry in, numbers out.
+//! Data flows one way: [`device`] sessions deliver records, [`campaign`] stores them, [`spectra`]
+//! computes FRFs from them, and [`substructuring`] and [`hysteresis`] compute the joint's stiffness
+//! from those. [`analyse`] runs these steps for a campaign and returns findings; [`report`] turns
+//! the findings into the document [`results`] and shows it. The analysis modules do not depend on
+//! devices, files or screens: they take arrays and geometry and return numbers.
 #![forbid(unsafe_code)]
 
 pub use jointrig_analysis::{

@@ -1,8 +1,10 @@
-//! Words from outside, made harmless: names that a device, a campaign file or a file of others brings.
+//! Makes untrusted names harmless: names from a device, a campaign file or a file of another
+//! program.
 //!
-//! A terminal obeys an escape sequence, a browser turns text around where a bidirectional sign says so, and a file system takes a stroke
-//! for a folder. The words stay as they are in the files; where they leave for one of these, they go through here. What was in them stays
-//! visible: ESC is shown as `\u{1b}`.
+//! A terminal executes escape sequences, a browser reorders text after a bidirectional control
+//! character, and a file system treats a slash as a folder separator. The names stay unchanged in
+//! the files; they pass through this module before they reach a terminal, a page or a file name.
+//! The removed characters stay visible: ESC is shown as `\u{1b}`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -10,13 +12,14 @@ use std::io::Write as _;
 
 use crc32fast::hash;
 
-/// Whether a letter does something instead of being seen.
+/// Whether a character has an effect instead of being displayed.
 fn acts(letter: char) -> bool {
     letter.is_control()
         || matches!(letter,
-            // marks, embeddings, overrides and isolates of the direction of writing; ends of lines and of paragraphs
+            // bidirectional marks, embeddings, overrides and isolates; line and paragraph
+            // separators
             '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
-            // invisible marks of byte order and between lines; tags
+            // byte order mark and interlinear annotation characters, which are invisible; tags
             | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
@@ -36,20 +39,23 @@ fn shown(text: &str, stays: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Text for a terminal or a page; our own messages have several lines.
+/// Escapes text for a terminal or a page. Line feeds stay, because our own messages have several
+/// lines.
 pub(crate) fn visible(text: &str) -> Cow<'_, str> {
     shown(text, |letter| letter == '\n')
 }
 
-/// A JSON document that is printed: what acts stands in it as an escape, which a program reads as the same text.
+/// Escapes control characters in a JSON document that is printed; a program reads the same text
+/// from it.
 pub(crate) fn printed_json(document: &str) -> Cow<'_, str> {
     in_json(document, "\\u")
 }
 
-/// A JSON document whose texts a page shows: what acts is visible in them.
+/// Escapes control characters in a JSON document so that a page that displays its strings shows the
+/// escapes.
 pub(crate) fn shown_json(document: &str) -> Cow<'_, str> {
     let mut units = in_json(document, "\\\\u");
-    // what the document escapes already is shown too
+    // control characters that the document has already escaped are shown as well
     let mut from = 0;
     while let Some(at) = units[from..].find('\\').map(|at| from + at) {
         let code = units.get(at + 2..at + 6).and_then(|code| u32::from_str_radix(code, 16).ok());
@@ -63,7 +69,8 @@ pub(crate) fn shown_json(document: &str) -> Cow<'_, str> {
     units
 }
 
-/// A document whose raw letters that act are written with `escape` and four figures each; ends of lines between its values stay.
+/// Writes every raw control character of a document as `escape` and four hexadecimal digits. Line
+/// feeds between its values stay.
 fn in_json<'d>(document: &'d str, escape: &str) -> Cow<'d, str> {
     let harmful = |letter: char| acts(letter) && letter != '\n';
     if !document.contains(harmful) {
@@ -73,7 +80,7 @@ fn in_json<'d>(document: &'d str, escape: &str) -> Cow<'d, str> {
     for letter in document.chars() {
         if harmful(letter) {
             for unit in letter.encode_utf16(&mut [0; 2]) {
-                // a String takes everything
+                // writing to a String cannot fail
                 let _ = write!(out, "{escape}{unit:04x}");
             }
         } else {
@@ -83,18 +90,20 @@ fn in_json<'d>(document: &'d str, escape: &str) -> Cow<'d, str> {
     Cow::Owned(out)
 }
 
-/// Longest name of a file that is made of a name from outside, bytes; systems take 255, and an extension comes behind it.
+/// Longest file name made of an untrusted name, bytes. Systems allow 255, and an extension is
+/// appended.
 const LONGEST: usize = 180;
 
-/// A name for a file: letters that a file system takes for something else are written as `%2F`, so that two names stay two. A very long
-/// one is cut, and ends with a sum of the whole.
+/// Makes a file name of a name: characters with a meaning for a file system are written as `%2F`
+/// and so on, so that different names stay different. A very long name is cut and ends with a
+/// checksum of the whole.
 pub(crate) fn file_name(name: &str) -> String {
     let mut out = String::with_capacity(name.len());
     for letter in name.chars() {
         let first = out.is_empty();
         let harmful = acts(letter)
             || matches!(letter, '/' | '\\' | ':' | '*' | '?' | '"' | '<' | '>' | '|' | '%')
-            // hidden files, `.` and `..`, and what a command takes for an option
+            // hidden files, `.` and `..`, and names that a command would take for an option
             || (first && matches!(letter, '.' | '-' | '~'));
         if harmful {
             for byte in letter.encode_utf8(&mut [0; 4]).bytes() {
@@ -113,12 +122,13 @@ pub(crate) fn file_name(name: &str) -> String {
     if out.is_empty() { "%00".into() } else { out }
 }
 
-/// Tells a person something, on stderr. Somebody who closed it wants to hear nothing: that ends no measurement.
+/// Prints a message on stderr. Errors are ignored, so that a closed stderr does not end a
+/// measurement.
 pub(crate) fn tell(text: &str) {
     let _ = std::io::stderr().lock().write_all(visible(text).as_bytes());
 }
 
-/// A line on stderr, by [`tell`].
+/// Prints a line on stderr through [`tell`].
 macro_rules! tell_line {
     () => { $crate::outside::tell("\n") };
     ($($part:tt)*) => { $crate::outside::tell(&(format!($($part)*) + "\n")) };
@@ -129,7 +139,8 @@ pub(crate) use tell_line;
 mod tests {
     use super::*;
 
-    /// A name that clears the screen, sets the window's title, and reads backwards.
+    /// A name that clears the screen, sets the window's title and reverses the direction of
+    /// writing.
     const NAME: &str = "A\u{1b}[2J\u{1b}]0;x\u{7}\u{202e}1Z\u{9b}";
 
     #[test]

@@ -1,5 +1,6 @@
-//! What a page may want changed: notes and verdicts, through the one writer of the campaign file; the end of measuring after the shot in hand; and,
-//! where `--allow-control` says so, the stage's answers. No page arms the hammer or moves the shaker.
+//! Changes that a page may request: notes and verdicts, through the only writer of the campaign
+//! file; the end of the measurement after the current shot; and, with `--allow-control`, answers to
+//! the prompts to move hammer and laser. No page arms the hammer or moves the shaker.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,9 +24,9 @@ use crate::campaign::verdict::Kind;
 use crate::live::message::Message;
 use crate::live::now::{Control, Doing};
 
-/// One page answers for so long after it was heard last.
+/// A page keeps the right to answer for this long after its last message.
 const LEASE: Duration = Duration::from_secs(10);
-/// An edit that is not done by then is done later: the shaker's levels are long.
+/// An edit that takes longer is completed later, because levels of the shaker take long.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Longest note or reason, characters.
 const LONGEST: usize = 2_000;
@@ -34,17 +35,17 @@ const NAME: usize = 64;
 
 /// What the measuring process lets pages do.
 pub struct Doors {
-    /// Where edits are handed in.
+    /// Receives edits.
     pub desk: Option<Desk>,
-    /// Where the stage's answers are given.
+    /// Receives answers to the prompts to move hammer and laser.
     pub answerer: Option<Answerer>,
-    /// Ends measuring after the shot in hand.
+    /// Ends the measurement after the current shot.
     pub stop: Arc<AtomicBool>,
-    /// Which page may answer, and when it was heard last.
+    /// The page that may answer, and the time of its last message.
     pub lease: Mutex<Option<(String, Instant)>>,
 }
 
-/// What can be wanted.
+/// Routes for changes.
 pub fn routes() -> Router<Arc<Shared>> {
     Router::new()
         .route("/api/notes", post(note))
@@ -58,7 +59,7 @@ pub fn routes() -> Router<Arc<Shared>> {
 
 type Asked<T> = Result<Json<T>, JsonRejection>;
 
-/// What was asked, or why it cannot be read.
+/// The request's content, or why it cannot be read.
 fn read<T>(asked: Asked<T>) -> Result<T, Problem> {
     match asked {
         Ok(Json(asked)) => Ok(asked),
@@ -74,7 +75,7 @@ impl Shared {
         })
     }
 
-    /// Lets the page go that answers, when it was not heard for too long.
+    /// Ends a page's right to answer when it has been silent for too long.
     pub fn end_lease(&self) {
         let Some(doors) = &self.doors else { return };
         let mut lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
@@ -84,13 +85,13 @@ impl Shared {
     }
 }
 
-/// Hands an edit in, and waits a little for what becomes of it.
+/// Submits an edit and waits briefly for its result.
 async fn handed_in(shared: &Shared, edit: Edit) -> Result<Response, Problem> {
     let doors = shared.doors()?;
     let desk = doors.desk.as_ref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
     let (to, told) = oneshot::channel();
     let taken = desk.hand_in(edit, move |what| {
-        // a page that has gone need not know
+        // the page may have disconnected
         let _ = to.send(what);
     });
     match taken {
@@ -117,7 +118,7 @@ fn over() -> Problem {
     Problem::new(StatusCode::CONFLICT, what, "use `jointrig campaign keep` and `campaign drop`")
 }
 
-/// A text that is neither empty nor endless, in one line.
+/// Joins a text into one line; refuses an empty or too long one.
 fn text(given: &str) -> Result<String, Problem> {
     let text = given.split_whitespace().collect::<Vec<_>>().join(" ");
     if text.is_empty() || text.chars().count() > LONGEST {

@@ -1,52 +1,53 @@
-//! Who may ask. The page is on the loopback address, which every program of this machine and every web page that its browser has open can
-//! reach: a name that was pointed at it (DNS rebinding) is told by `Host`, another page by `Origin`, another user by the token.
+//! Access checks. The page is on the loopback address, which every program on this computer and
+//! every web page open in its browser can reach. A foreign host name that resolves to it (DNS
+//! rebinding) is detected by `Host`, a foreign page by `Origin`, another user by the token.
 
 use std::io;
 
 use axum::http::{HeaderMap, StatusCode, header};
 
-/// 128 random bits, known to whoever was told the address.
+/// 128 random bits, known only to those who were given the address.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
 impl Token {
-    /// A new one.
+    /// A new random token.
     ///
     /// # Errors
-    /// The operating system has no random numbers.
+    /// The operating system provides no random numbers.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
         Ok(Self(format!("{:032x}", u128::from_le_bytes(bytes))))
     }
 
-    /// As it stands in the address.
+    /// The token as text, as in the address.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// Whether that is it; it takes as long for every wrong one of the same length.
+    /// Compares tokens in a time that depends only on the length.
     pub fn is(&self, other: &str) -> bool {
         let differ = self.0.bytes().zip(other.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b));
         self.0.len() == other.len() && differ == 0
     }
 }
 
-/// Why somebody is turned away.
+/// Why a request is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// The request is for another host.
     Host,
-    /// The request comes from a page that is not ours.
+    /// The request comes from another page.
     Origin,
-    /// The request lacks the token.
+    /// The token is missing or wrong.
     Token,
-    /// The token is one to look with.
+    /// The token only permits viewing.
     LooksOnly,
 }
 
 impl Refusal {
-    /// Its status.
+    /// Its HTTP status.
     pub fn status(self) -> StatusCode {
         match self {
             Self::Host => StatusCode::MISDIRECTED_REQUEST,
@@ -72,10 +73,10 @@ impl Refusal {
     }
 }
 
-/// Whether a request is meant for this server, and comes from its own page or from no page at all.
+/// Checks that a request is addressed to this server and comes from its own page or from no page.
 ///
 /// # Errors
-/// Why not.
+/// The reason for a rejection.
 pub fn from_here(headers: &HeaderMap, port: u16) -> Result<(), Refusal> {
     let ours = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{port}"));
     let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or_default());
@@ -90,10 +91,10 @@ pub fn from_here(headers: &HeaderMap, port: u16) -> Result<(), Refusal> {
     }
 }
 
-/// The token that a request carries.
+/// The token of a request.
 ///
 /// # Errors
-/// It carries none.
+/// There is none.
 pub fn token(headers: &HeaderMap) -> Result<&str, Refusal> {
     headers
         .get(header::AUTHORIZATION)

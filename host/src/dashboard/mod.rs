@@ -1,8 +1,10 @@
-//! The live page: a campaign file in the browser while it is measured, and the way through it afterwards.
+//! The live page: shows a campaign file in the browser during and after the measurement.
 //!
-//! No page arms the hammer or moves the shaker. `server` speaks HTTP on the loopback address alone, `guard` turns away whoever should not ask,
-//! `routes` answers, `edit` hands over what a page wants changed, `socket` says what is new, `page` is what the browser gets.
-//! All of them read what [`crate::live`] has to say, on threads of their own: a page that stalls costs nothing but its own picture.
+//! No page arms the hammer or moves the shaker. `server` serves HTTP on the loopback address only,
+//! `guard` rejects unauthorised requests, `routes` answers requests, `edit` passes a page's changes
+//! on, `socket` sends updates, `page` is the content for the browser. All of them use the data of
+//! [`crate::live`] and run on separate threads, so that a stalled page affects only its own
+//! display.
 
 mod edit;
 mod guard;
@@ -35,85 +37,86 @@ use crate::live::watching::Watching;
 use edit::Doors;
 use guard::Token;
 
-/// How often the file is asked whether it has changed: a question to the operating system, a few microseconds.
+/// Interval of the checks for changes of the file; a check takes a few microseconds.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time for the last word to reach the pages.
+/// Time for the last message to reach the pages.
 const LAST_WORD: Duration = Duration::from_millis(300);
 
-/// Why there is no page.
+/// Why the page cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum DashboardError {
-    /// The campaign file.
+    /// The campaign file cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The port.
+    /// The port cannot be used.
     #[error(
         "the page cannot be served on 127.0.0.1:{port}: {source}; choose another port with --port, or 0 for any"
     )]
     Port {
-        /// The one asked for.
+        /// The requested port.
         port: u16,
-        /// What the operating system said.
+        /// The operating system's error.
         source: io::Error,
     },
-    /// Threads or random numbers.
+    /// A thread could not be started, or there are no random numbers.
     #[error("the page cannot be served: {0}")]
     System(io::Error),
 }
 
-/// What every part of the server shares.
+/// Data shared by all parts of the server.
 struct Shared {
     file: Option<PathBuf>,
     port: u16,
-    /// That of looking.
+    /// The token for viewing.
     look: Token,
-    /// That of editing, where there is something to edit.
+    /// The token for editing, where editing is possible.
     edit: Option<Token>,
     /// What the measuring process lets pages do.
     doors: Option<Doors>,
     bus: Arc<Bus>,
     formed: Arc<Formed>,
-    /// The FRF of the cell that is measured.
+    /// The average spectra of the cell that was requested last.
     averages: Averages,
     frames: Arc<Frames>,
 }
 
 impl Shared {
-    /// Whether this is a token of somebody who may look.
+    /// Whether this token permits viewing.
     fn may_look(&self, token: &str) -> bool {
         self.look.is(token) || self.edit.as_ref().is_some_and(|edit| edit.is(token))
     }
 }
 
-/// What the measuring process hangs on its session and its runner, so that a page sees what is going on.
+/// The ends that the measuring process attaches to its session and its runner, so that a page shows
+/// what is being done.
 pub struct Hooks {
-    /// For the stream.
+    /// For the session's stream.
     pub tap: Tap,
     /// For the runner.
     pub eye: Arc<Eye>,
-    /// What pages want changed, for whoever writes the campaign file.
+    /// Changes requested by pages, for the thread that writes the campaign file.
     pub edits: Option<Edits>,
-    /// What a page answers for hammer and laser.
+    /// Answers of a page to the prompts to move hammer and laser.
     pub answers: Option<Answers>,
 }
 
-/// What a measuring process lets its pages see and do.
+/// What a measuring process lets its pages show and do.
 #[derive(Debug)]
 pub struct Measuring<'a> {
-    /// The campaign file; none where only channels are looked at.
+    /// The campaign file; `None` where only channels are shown.
     pub file: Option<&'a Path>,
-    /// Set by a page to end after the shot in hand.
+    /// Set by a page to end the measurement after the current shot.
     pub stop: Arc<AtomicBool>,
-    /// Whether a page may answer for hammer and laser.
+    /// Whether a page may answer the prompts to move hammer and laser.
     pub control: bool,
 }
 
-/// A page that is served as long as this lives.
+/// The page; it is served for as long as this value lives.
 pub struct Dashboard {
     address: SocketAddr,
     look: Token,
     edit: Option<Token>,
-    /// Ends those who tell; then the server.
+    /// Stops the threads that send messages, and then the server.
     over: Arc<AtomicBool>,
     gone: Arc<AtomicBool>,
     bus: Arc<Bus>,
@@ -122,18 +125,19 @@ pub struct Dashboard {
 }
 
 impl Dashboard {
-    /// Serves the page of a campaign file on the loopback address; port 0 takes a free one. It looks and does nothing else.
+    /// Serves the page of a campaign file on the loopback address for viewing only; port 0 selects
+    /// a free port.
     ///
     /// # Errors
-    /// The file cannot be read, or the port cannot be had.
+    /// The file cannot be read, or the port cannot be used.
     pub fn of_file(file: &Path, port: u16) -> Result<Self, DashboardError> {
         Self::start(Some(file), port, None)
     }
 
-    /// Serves the page of a process that measures.
+    /// Serves the page of a measuring process.
     ///
     /// # Errors
-    /// The file cannot be read, or the port cannot be had.
+    /// The file cannot be read, or the port cannot be used.
     pub fn of_measuring(measuring: &Measuring<'_>, port: u16) -> Result<(Self, Hooks), DashboardError> {
         let ((eye, ear), (tap, view)) = (eye(), tap());
         let (desk, edits) = measuring.file.map(|_| edits()).unzip();
@@ -171,7 +175,7 @@ impl Dashboard {
             tellers.push(named("page: file", move || watch(&mut follower, &to, &ended))?);
         }
         if let Some(path) = file.map(Path::to_owned) {
-            // an analysis under way holds nothing and is not waited for
+            // not joined at the end: a running analysis holds no resources
             let (to, shown, ended) = (bus.clone(), formed.clone(), over.clone());
             named("page: estimate", move || form(&path, &to, &shown, &ended))?;
         }
@@ -195,12 +199,13 @@ impl Dashboard {
         Ok(Self { address, look, edit, over, gone, bus: told, tellers, server: Some(server) })
     }
 
-    /// The address to edit with: notes, keep, drop, and the end after the shot in hand. None where nothing is measured.
+    /// The address for editing: notes, keep, drop, and stop after the current shot. `None` where
+    /// nothing is measured.
     pub fn edit_url(&self) -> Option<String> {
         self.edit.as_ref().map(|edit| format!("http://{}/#edit={}", self.address, edit.as_str()))
     }
 
-    /// The address to look at. The secret stands behind the `#`, which a browser sends nowhere.
+    /// The address for viewing. The token follows the `#`, a part that browsers never send.
     pub fn url(&self) -> String {
         format!("http://{}/#look={}", self.address, self.look.as_str())
     }
@@ -214,12 +219,12 @@ impl Drop for Dashboard {
                 log::error!("a part of the page ended in a panic; what was measured is in the file");
             }
         }
-        // the last word of a campaign is the one that is waited for
+        // wait so that the last message of a campaign reaches its listeners
         if self.bus.is_heard() {
             std::thread::sleep(LAST_WORD);
         }
         self.gone.store(true, Ordering::Relaxed);
-        // the server lets its clients go within moments
+        // the server closes its connections promptly
         if let Some(server) = self.server.take()
             && server.join().is_err()
         {
@@ -232,11 +237,11 @@ fn named(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<
     std::thread::Builder::new().name(name.into()).spawn(work).map_err(DashboardError::System)
 }
 
-/// Says what is new in the file, until `stop`.
+/// Sends changes of the file until `stop`.
 fn watch(follower: &mut Follower, bus: &Bus, stop: &AtomicBool) {
     let mut trouble = None;
     loop {
-        // what was stored before the end is told
+        // changes stored before `stop` was set are still sent
         let last = stop.load(Ordering::Relaxed);
         match follower.look() {
             Ok(messages) => {

@@ -1,4 +1,4 @@
-//! An answer that is none: what is wrong, where, and what to do.
+//! Error responses: what is wrong, where, and what to do.
 
 use axum::Json;
 use axum::http::StatusCode;
@@ -8,7 +8,7 @@ use serde_json::json;
 use super::guard::Refusal;
 use crate::campaign::store::error::StoreError;
 
-/// Why there is no answer.
+/// Why a request could not be answered.
 pub struct Problem {
     status: StatusCode,
     what: String,
@@ -16,12 +16,12 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// With this status.
+    /// A problem with this status.
     pub fn new(status: StatusCode, what: impl Into<String>, todo: &'static str) -> Self {
         Self { status, what: what.into(), todo }
     }
 
-    /// There is no such thing.
+    /// A problem with status 404, not found.
     pub fn missing(what: &str) -> Self {
         Self::new(StatusCode::NOT_FOUND, what, "go back to the page")
     }

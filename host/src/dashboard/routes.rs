@@ -1,4 +1,4 @@
-//! What can be asked for, and how it is answered.
+//! Routes of the server and their handlers.
 
 use std::sync::Arc;
 
@@ -20,14 +20,14 @@ use crate::live::found::drawn;
 use crate::live::{figures, numbers, spectra_figures};
 use crate::report::figure::{self, Figure};
 
-/// What a page of ours may do: run our script, use our style, and ask this server.
+/// Permissions of our page: run our script, use our style sheet, and send requests to this server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; \
     frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-/// Bytes of what a page wants changed.
+/// Largest body of a request for a change, bytes.
 const BODY: usize = 8 * 1024;
 
-/// Everything that is served.
+/// All routes.
 pub fn router(shared: Arc<Shared>) -> Router {
     let data = Router::new()
         .route("/api/state", get(state))
@@ -59,7 +59,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
 }
 
 impl Shared {
-    /// The campaign file, to read.
+    /// Opens the campaign file read-only.
     fn store(&self) -> Result<Store, Problem> {
         let file = self.file.as_deref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
         Ok(Store::open_read_only(file)?)
@@ -117,7 +117,7 @@ async fn state(State(shared): State<Arc<Shared>>) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], whole).into_response()
 }
 
-/// A figure's text as the page gets it.
+/// Responds with a figure as JSON.
 fn sent(text: Option<String>) -> Result<Response, Problem> {
     let text = text.ok_or_else(|| Problem::missing("there are no data for this figure yet"))?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
@@ -130,7 +130,7 @@ async fn of_campaign(
     sent(shared.formed.found().figures.get(&name).cloned())
 }
 
-/// The shaker's level as it is now.
+/// The shaker's current level.
 async fn of_shaker(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
     let figure = shared.bus.shaker().as_ref().and_then(figures::shaker);
     let simulated = shared.bus.simulated();
@@ -143,12 +143,12 @@ async fn of_shaker(State(shared): State<Arc<Shared>>) -> Result<Response, Proble
     sent(figure.map(|figure| drawn(&Figure { from, ..figure })))
 }
 
-/// Figures of a record or a cell, as the file has it now.
+/// Figures of a record or a cell, from the current content of the file.
 async fn of_one(
     State(shared): State<Arc<Shared>>,
     Path((of, id, name)): Path<(String, i64, String)>,
 ) -> Result<Response, Problem> {
-    // a cell's spectra take longest: the page's other words do not wait for them
+    // on a separate thread: a cell's spectra take long, and other messages must not wait for them
     let made = tokio::task::spawn_blocking(move || one(&shared, &of, id, &name)).await;
     let broken =
         |_| Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "the figure could not be made", "report this");
@@ -172,7 +172,7 @@ fn one(shared: &Shared, of: &str, id: i64, name: &str) -> Result<Option<Figure>,
     Ok(from_file(figure, &store, record)?)
 }
 
-/// A number of every cell for each view of the matrix.
+/// Numbers of every cell for each view of the matrix.
 async fn matrix(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
     let store = shared.store()?;
     let numbers = numbers::of_cells(
@@ -184,7 +184,7 @@ async fn matrix(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> 
     Ok(Json(numbers).into_response())
 }
 
-/// The figure with what it was made from.
+/// The figure with its source.
 fn from_file(
     figure: Option<Figure>,
     store: &Store,

@@ -1,4 +1,5 @@
-//! The server: one thread, the loopback address, a bound on everything that a stranger may send.
+//! The HTTP server: one thread, on the loopback address, with limits on everything that a client
+//! may send.
 
 use std::io;
 use std::net::TcpListener;
@@ -12,13 +13,13 @@ use tokio::sync::Semaphore;
 
 use super::{Shared, routes};
 
-/// Connections at once; further ones wait until one ends.
+/// Most simultaneous connections; further ones are closed.
 const CLIENTS: usize = 32;
-/// Bytes of a request's head.
+/// Largest head of a request, bytes.
 const HEAD: usize = 16 * 1024;
-/// Time for a request's head.
+/// Time limit for a request's head.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// How often it asks whether it shall stop.
+/// Interval of the checks of `stop`.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Serves until `stop`.
@@ -39,7 +40,7 @@ pub fn serve(listener: TcpListener, shared: Shared, stop: &AtomicBool) -> io::Re
             let (stream, _) = match accepted {
                 Ok(accepted) => accepted,
                 Err(error) => {
-                    // out of file descriptors, or the client is gone already: neither ends the page
+                    // out of file descriptors, or the client has disconnected: the server continues
                     log::debug!("a client could not be taken: {error}");
                     tokio::time::sleep(LOOK).await;
                     continue;

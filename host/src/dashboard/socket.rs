@@ -1,5 +1,6 @@
-//! What is new, as it comes: a WebSocket whose first message is the token. A page that wants the stream of samples says so, and says how many of its
-//! frames it has had: more than [`UNREAD`] that it has not had are never under way, whatever buffers lie between.
+//! Updates over a WebSocket, whose first message is the token. A page requests the sample stream
+//! and reports how many of its frames it has received; at most [`UNREAD`] frames are under way,
+//! however large the buffers in between are.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,47 +14,47 @@ use tokio::time::{Instant, timeout, timeout_at};
 use super::Shared;
 use crate::live::frames::Looker;
 
-/// Bytes of a message from a page.
+/// Largest message from a page, bytes.
 const MESSAGE: usize = 4 * 1024;
-/// Time for the token.
+/// Time limit for the token.
 const TOKEN_TIME: Duration = Duration::from_secs(2);
-/// A page that is silent for so long is let go; it reconnects.
+/// A page that is silent for this long is disconnected; it reconnects.
 const SILENT: Duration = Duration::from_secs(10);
-/// Frames that may be under way to a page.
+/// Most frames under way to a page.
 const UNREAD: u64 = 3;
 
-/// What a page says first.
+/// First message of a page.
 #[derive(Deserialize)]
 struct Hello {
     token: String,
-    /// The last message that it had; none for the whole.
+    /// Number of the last message received; `None` for the complete state.
     after: Option<u64>,
-    /// Whether it wants the stream.
+    /// Whether it requests the stream.
     #[serde(default)]
     stream: bool,
 }
 
-/// What a page says later; every word is a sign of life.
+/// Later messages of a page; each one is also a sign of life.
 #[derive(Deserialize)]
 struct Word {
-    /// Frames that it has had since it came.
+    /// Frames received since it connected.
     frames: Option<u64>,
-    /// Whether it wants the stream from now on.
+    /// Whether it requests the stream from now on.
     stream: Option<bool>,
 }
 
-/// The stream as one page gets it.
+/// The sample stream for one page.
 struct Stream {
-    /// As long as it wants it.
+    /// Present while the page requests the stream.
     looker: Option<Looker>,
     sent: u64,
     had: u64,
-    /// The number of the last frame that it was sent or has missed.
+    /// Number of the last frame that was sent or skipped.
     at: u64,
     missed: u32,
 }
 
-/// Opens it.
+/// Opens the WebSocket.
 pub async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) -> Response {
     upgrade.max_message_size(MESSAGE).max_frame_size(MESSAGE).on_upgrade(move |socket| talk(socket, shared))
 }
@@ -99,7 +100,8 @@ async fn talk(mut socket: WebSocket, shared: Arc<Shared>) {
     }
 }
 
-/// Who does not read is let go: what it missed, it gets when it comes back.
+/// Sends a message. A page that does not read it in time is disconnected; it gets what it missed
+/// when it reconnects.
 async fn send(socket: &mut WebSocket, message: Message) -> bool {
     matches!(timeout(SILENT, socket.send(message)).await, Ok(Ok(())))
 }
@@ -109,7 +111,7 @@ impl Stream {
         if !wants {
             self.looker = None;
         } else if self.looker.is_none() {
-            // what came while it did not look is not missed
+            // frames that came while it did not request the stream do not count as missed
             self.at = *shared.frames.newest().borrow();
             self.looker = Some(shared.frames.look());
         }
@@ -128,7 +130,7 @@ impl Stream {
         self.looker.is_some() && self.sent - self.had < UNREAD
     }
 
-    /// The next frame, if the page wants one and there is one.
+    /// The next frame, if the page requests one and there is one.
     fn next(&mut self, shared: &Shared) -> Option<Vec<u8>> {
         if !self.ready() {
             return None;

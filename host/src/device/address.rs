@@ -1,13 +1,13 @@
-//! Device addresses: where an instrument is, in one word.
+//! Device addresses: the location of an instrument in one word.
 //!
-//! | address | what it is |
+//! | address | meaning |
 //! |---|---|
 //! | `sim:` or `sim:RIG.toml` | the simulated rig, built in or described in a file |
 //! | `serial:PATH` | a serial port or pseudo-terminal |
 //! | `tcp:HOST:PORT` | a socket |
-//! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, over the built-in rig |
-//! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one attached, or by serial number |
-//! | `replay:` | known, but not served by this version |
+//! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, with the built-in rig |
+//! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one, or by serial |
+//! | `replay:` | known, but not supported by this version |
 
 use std::fmt;
 use std::path::PathBuf;
@@ -16,26 +16,27 @@ use std::str::FromStr;
 use super::error::DeviceError;
 use super::transport::Transport;
 
-/// Where an instrument is.
+/// The location of an instrument.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// The simulated rig: the built-in one, or one described in a file.
     Sim {
-        /// The rig's description; the built-in one without.
+        /// The file with the rig's description; `None` for the built-in rig.
         rig: Option<PathBuf>,
     },
     /// A serial port.
     Serial(PathBuf),
     /// The vendor interface of an attached controller.
     Usb {
-        /// Its serial number; the only one attached without.
+        /// Its serial number; `None` for the only one attached.
         serial: Option<String>,
     },
     /// A socket, as `host:port`.
     Tcp(String),
-    /// The emulator: with the image named by the environment, or with this one.
+    /// The emulator.
     Qemu {
-        /// The firmware image for the emulated board.
+        /// The firmware image for the emulated board; `None` for the one named by the environment
+        /// or built by cargo.
         image: Option<PathBuf>,
     },
 }
@@ -81,11 +82,11 @@ impl fmt::Display for Address {
 }
 
 impl Address {
-    /// Opens the byte pipe to the device. `seed` sets the scatter of a simulated rig and means nothing
-    /// to a real one.
+    /// Opens the connection to the device. `seed` sets the scatter of a simulated rig; other
+    /// devices ignore it.
     ///
     /// # Errors
-    /// [`DeviceError::Open`] with the reason and what to do.
+    /// [`DeviceError::Open`] with the cause and what to do.
     pub fn open(&self, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
         match self {
             Self::Sim { rig } => open_sim(rig.as_deref(), seed),

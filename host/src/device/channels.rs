@@ -1,17 +1,17 @@
-//! The channel map: what each place of a scan measures, and how a code becomes a quantity.
+//! The channel map: what each channel of a scan measures, and how a code converts to SI.
 
 use jointrig_protocol::channel::{Axis, Channel, Role};
 
 /// Every channel of a scan, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelMap {
-    /// The map's id on the wire.
+    /// The map's id in the protocol.
     pub id: u8,
-    /// Scans per second, Hz; the nearest whole number where `exact_hz` has another rate.
+    /// Scans per second, Hz; the nearest integer where `exact_hz` is set.
     pub rate_hz: u32,
-    /// The rate where it is no whole number, Hz: records from elsewhere may have any.
+    /// The rate where it is not an integer, Hz; imported records may have any rate.
     pub exact_hz: Option<f64>,
-    /// The channels in the order of the scan.
+    /// The channels in scan order.
     pub channels: Vec<Channel>,
 }
 
@@ -21,7 +21,7 @@ impl ChannelMap {
         self.exact_hz.unwrap_or(f64::from(self.rate_hz))
     }
 
-    /// How many channels a scan has.
+    /// Number of channels per scan.
     pub fn len(&self) -> usize {
         self.channels.len()
     }
@@ -31,36 +31,36 @@ impl ChannelMap {
         self.channels.is_empty()
     }
 
-    /// Place of the first channel that serves as `role`.
+    /// Index of the first channel with this role.
     pub fn place(&self, role: Role) -> Option<usize> {
         self.channels.iter().position(|channel| channel.role == role)
     }
 
-    /// Places of the channels that serve as `role`, in order.
+    /// Indices of the channels with this role, in order.
     pub fn places(&self, role: Role) -> Vec<usize> {
         (0..self.len()).filter(|place| self.channels[*place].role == role).collect()
     }
 
-    /// Places of the channels at the aimed point: the vibrometer's x, y and z, or as many of them as a sensor from elsewhere has; none
-    /// without the first.
+    /// Indices of the response channels: the vibrometer's x, y and z, or as many of them in this
+    /// order as an imported record has; `None` without the first.
     pub fn responses(&self) -> Option<Vec<usize>> {
         let at = |axis| self.place(Role::Response(axis));
         let there: Vec<usize> = [Axis::X, Axis::Y, Axis::Z].into_iter().map_while(at).collect();
         (!there.is_empty()).then_some(there)
     }
 
-    /// Place of the channel of that name.
+    /// Index of the channel of that name.
     pub fn named(&self, name: &str) -> Option<usize> {
         self.channels.iter().position(|channel| channel.name == name)
     }
 
-    /// The codes of the channel at `place` in SI units ([`jointrig_protocol::channel::Quantity::unit`]).
-    /// A place outside the map gives nothing.
+    /// The codes of the channel at `place` in SI units
+    /// ([`jointrig_protocol::channel::Quantity::unit`]); empty for an index outside the map.
     pub fn to_si(&self, place: usize, codes: &[i16]) -> Vec<f64> {
         self.si(place, codes).collect()
     }
 
-    /// As [`ChannelMap::to_si`], value by value.
+    /// As [`ChannelMap::to_si`], as an iterator.
     pub fn si(&self, place: usize, codes: &[i16]) -> impl ExactSizeIterator<Item = f64> {
         let channel = self.channels.get(place);
         let (scale, codes) = channel.map_or((0.0, &[][..]), |channel| (channel.units_per_code(), codes));

@@ -1,5 +1,6 @@
-//! What a device says of itself and of its scans, held against what can be. A device that is broken, or made to hurt, is refused by a
-//! sentence before anything moves and before anything is stored: what it says enters sizes, scales and indices.
+//! Checks that what a device reports about itself and its scans is possible. Sizes, scales and
+//! indices are computed from it, so a faulty or malicious device is refused with a message before
+//! anything moves and before anything is stored.
 
 use jointrig_protocol::answer::{Answer, Counters, Info, Status};
 use jointrig_protocol::channel::Channel;
@@ -9,32 +10,33 @@ use jointrig_protocol::limits::{COIL_PULSE_CAP_US, MAX_CHANNELS};
 use jointrig_protocol::shot::Shot;
 use jointrig_protocol::slow::Slow;
 
-/// Scans that a ring may hold: more than any controller has memory for, and little for a host.
+/// Scans that a ring may hold. The upper bound exceeds the memory of any controller and is small
+/// for a host.
 const RING_SCANS: std::ops::RangeInclusive<u32> = 256..=1 << 20;
 
-/// Scans per second: from a slow strain gauge to the fastest converter of 16 bits, Hz.
+/// Scans per second, Hz: from a slow strain gauge to the fastest 16-bit converter.
 const RATE_HZ: std::ops::RangeInclusive<u32> = 100..=2_000_000;
 
-/// No stream comes so far: at a million scans a second this is 285 years. Sums of such indices stay whole.
+/// Largest scan index: 285 years at a million scans per second. Sums of such indices stay exact.
 pub(super) const LAST_SCAN: u64 = 1 << 53;
 
 /// The widest range of a converter, V.
 const RANGE_V: f32 = 1000.0;
 
-/// What a signal may lag behind, ns.
+/// Longest delay of a signal, ns.
 const DELAY_NS: u32 = 1_000_000_000;
 
-/// So far ahead of the newest scan nothing is waited for, s.
+/// Furthest scan ahead of the newest one that may be waited for, s.
 pub(super) const AHEAD_S: f64 = 3600.0;
 
-/// A sentence about what cannot be; it ends a sentence that begins with the device.
+/// What is impossible, as the end of a sentence whose subject is the device.
 pub(super) type Claim = Result<(), String>;
 
 fn refuse(holds: bool, what: impl FnOnce() -> String) -> Claim {
     if holds { Ok(()) } else { Err(what()) }
 }
 
-/// The device's introduction.
+/// Checks the device's hello.
 pub(super) fn of_hello(hello: &Hello) -> Claim {
     refuse(RING_SCANS.contains(&hello.ring_scans), || {
         format!(
@@ -46,7 +48,7 @@ pub(super) fn of_hello(hello: &Hello) -> Claim {
     })
 }
 
-/// Who it is.
+/// Checks the device's description.
 pub(super) fn of_info(info: &Info, hello: &Hello) -> Claim {
     let Info { channels, scan_rate_hz, ring_scans, coil_cap_us, drive_v, .. } = *info;
     refuse((1..=MAX_CHANNELS).contains(&usize::from(channels)), || {
@@ -70,7 +72,7 @@ pub(super) fn of_info(info: &Info, hello: &Hello) -> Claim {
     refuse(drive_v.is_finite() && drive_v >= 0.0, || format!("says that its drive gives {drive_v} V"))
 }
 
-/// A channel, at its place after `before`.
+/// Checks a channel, which follows the channels `before`.
 pub(super) fn of_channel(channel: &Channel, before: &[Channel]) -> Claim {
     let (place, name) = (before.len(), channel.name.as_str());
     refuse(!name.trim().is_empty() && before.iter().all(|other| other.name != channel.name), || {
@@ -94,7 +96,7 @@ pub(super) fn of_channel(channel: &Channel, before: &[Channel]) -> Claim {
     refuse((1..=32).contains(&bits), || format!("says that `{name}` has {bits} bits: 1 to 32 can be"))
 }
 
-/// Slow values.
+/// Checks the slow values.
 pub(super) fn of_slow(slow: &Slow) -> Claim {
     let celsius = slow.temperature_c.unwrap_or(0.0);
     refuse((-273.2..=2000.0).contains(&celsius), || format!("says that the specimen has {celsius} °C"))?;
@@ -102,7 +104,7 @@ pub(super) fn of_slow(slow: &Slow) -> Claim {
     refuse(strange.is_none(), || "says that a supply's bias is no number".into())
 }
 
-/// An index of a scan.
+/// Checks the index of a scan.
 fn scan(what: &str, at: u64) -> Claim {
     refuse(at <= LAST_SCAN, || format!("says that {what} at scan {at}: no stream comes so far"))
 }
@@ -134,7 +136,7 @@ fn of_status(status: &Status) -> Claim {
     status.shot.as_ref().map_or(Ok(()), of_shot)
 }
 
-/// Whatever it answers.
+/// Checks an answer.
 pub(super) fn of_answer(answer: &Answer) -> Claim {
     match answer {
         Answer::Status(status) => of_status(status),
@@ -147,7 +149,7 @@ pub(super) fn of_answer(answer: &Answer) -> Claim {
     }
 }
 
-/// Whatever it says unasked.
+/// Checks an event.
 pub(super) fn of_event(event: &event::Numbered) -> Claim {
     match &event.event {
         Event::Shot(shot) => of_shot(shot),

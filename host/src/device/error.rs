@@ -1,4 +1,4 @@
-//! What can go wrong between host and device, in the words of whoever stands at the rig.
+//! Errors between host and device, worded for the operator.
 
 use std::io;
 
@@ -6,11 +6,11 @@ use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::hello::Mismatch;
 use jointrig_protocol::sync::ClockFault;
 
-/// What to do about "permission denied" on Linux.
+/// Advice for "permission denied" on Linux.
 pub(super) const INSTALL_UDEV_RULE: &str = "install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, \
      then `sudo udevadm control --reload && sudo udevadm trigger`)";
 
-/// The file whose firmware belongs to this program, for the device at an address.
+/// The firmware file that matches this program, for the device at an address.
 pub fn flash_file(address: &str) -> &'static str {
     if address.starts_with("qemu:") {
         "the image mps2-an505, which `cargo xtask firmware` of this program's sources builds"
@@ -19,23 +19,23 @@ pub fn flash_file(address: &str) -> &'static str {
     }
 }
 
-/// Why a device could not be reached or used.
+/// Why a device could not be opened or used.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// The address is not one of the known forms.
+    /// The address does not have a known form.
     #[error("`{given}` is not a device address: {why}")]
     Address {
-        /// What was given.
+        /// The address given.
         given: String,
         /// What is wrong with it.
         why: String,
     },
-    /// The address is a known form that this build does not serve.
+    /// The address has a known form that this build does not support.
     #[error(
         "device address `{given}`: `{scheme}:` is not built into this version; use sim:, serial:, usb: or tcp:"
     )]
     NotBuilt {
-        /// What was given.
+        /// The address given.
         given: String,
         /// Its scheme.
         scheme: String,
@@ -43,9 +43,9 @@ pub enum DeviceError {
     /// The device could not be opened.
     #[error("cannot open {address}: {why}")]
     Open {
-        /// Which device.
+        /// The device.
         address: String,
-        /// Why, and what to do.
+        /// The cause, and what to do.
         why: String,
     },
     /// The link broke while in use.
@@ -53,11 +53,11 @@ pub enum DeviceError {
         "the link to {address} broke while {doing}: {source}\ncheck cable and power, then run the same command again"
     )]
     Link {
-        /// Which device.
+        /// The device.
         address: String,
         /// What was being done.
         doing: &'static str,
-        /// What the operating system said.
+        /// The operating system's error.
         source: io::Error,
     },
     /// No answer after every retry.
@@ -66,111 +66,111 @@ pub enum DeviceError {
          and that no other program holds it"
     )]
     NoAnswer {
-        /// Which device.
+        /// The device.
         address: String,
-        /// What was asked.
+        /// The request.
         request: &'static str,
-        /// How often it was asked.
+        /// How often it was sent.
         tries: u32,
     },
-    /// The versions do not fit.
+    /// The protocol versions do not match.
     #[error("{address}: {mismatch} ({})", flash_file(address))]
     Version {
-        /// Which device.
+        /// The device.
         address: String,
         /// Both versions, and what to do.
         mismatch: Mismatch,
     },
-    /// The device refused.
+    /// The device refused a request.
     #[error("{address} refused `{request}`: {refusal}")]
     Refused {
-        /// Which device.
+        /// The device.
         address: String,
-        /// What was asked.
+        /// The request.
         request: &'static str,
         /// Why it was refused.
         refusal: Box<Refusal>,
     },
-    /// The device answered something that was not asked.
+    /// The answer does not match the request.
     #[error("{address} answered `{request}` with something else ({got}): firmware and program do not fit")]
     WrongAnswer {
-        /// Which device.
+        /// The device.
         address: String,
-        /// What was asked.
+        /// The request.
         request: &'static str,
-        /// What came.
+        /// The answer received.
         got: String,
     },
-    /// The device started anew or its stream ended unasked.
+    /// The device restarted, or its stream ended without a request.
     #[error(
         "{address} restarted or ended its stream (epoch {epoch}) in the middle of the work; \
          run the same command again: it resumes where this one stopped"
     )]
     Restarted {
-        /// Which device.
+        /// The device.
         address: String,
         /// The epoch that was running.
         epoch: u32,
     },
-    /// What it says cannot be.
+    /// A report of the device is impossible.
     #[error(
         "{address} {what}; nothing more is done with it: check its firmware ({}), then run the same command again",
         flash_file(address)
     )]
     Nonsense {
-        /// Which device.
+        /// The device.
         address: String,
-        /// What it says, and what can be.
+        /// What it reports, and what is possible.
         what: String,
     },
-    /// No samples although a stream runs, or next to none.
+    /// A stream is running, but almost no scans arrive.
     #[error(
         "{address} sent {got} scans in {seconds} s although its stream runs (waiting for scan {scan}): \
          reset the controller, then run the same command again"
     )]
     Stalled {
-        /// Which device.
+        /// The device.
         address: String,
-        /// How long next to nothing came, s.
+        /// How long almost nothing arrived, s.
         seconds: u64,
-        /// What came, scans.
+        /// Scans that arrived in that time.
         got: u64,
         /// The scan that was waited for.
         scan: u64,
     },
-    /// Something needs a stream and there is none.
+    /// A stream is needed, but none was started.
     #[error("{address}: no stream was started")]
     NoStream {
-        /// Which device.
+        /// The device.
         address: String,
     },
-    /// The device's firmware is older than what is asked of it.
+    /// The device's firmware is too old for a request.
     #[error(
         "{address} speaks protocol {}.{}, in which it cannot {what}: flash firmware of protocol {}.{} or newer ({})",
         speaks.0, speaks.1, needs.0, needs.1, flash_file(address)
     )]
     TooOld {
-        /// Which device.
+        /// The device.
         address: String,
-        /// Major and minor of its protocol.
+        /// Major and minor version of its protocol.
         speaks: (u16, u16),
-        /// The first that can.
+        /// The first version that supports the request.
         needs: (u16, u16),
-        /// What it cannot.
+        /// What it cannot do.
         what: &'static str,
     },
-    /// The clock that was to time the scans is not good.
+    /// The clock that was to time the scans has a fault.
     #[error("{address}: {fault}")]
     Clock {
-        /// Which device.
+        /// The device.
         address: String,
-        /// What is wrong with it, and what to do.
+        /// The fault, and what to do.
         fault: ClockFault,
     },
-    /// The channels do not serve the purpose.
+    /// The channels do not suit the purpose.
     #[error("{address}: {what}")]
     Channels {
-        /// Which device.
+        /// The device.
         address: String,
         /// What is wrong, and what to do.
         what: String,

@@ -1,4 +1,5 @@
-//! In step with another recorder: which clock times the scans, and edges that both see.
+//! Synchronisation with another recorder: the clock that times the scans, and edges that both
+//! record.
 
 use std::time::{Duration, Instant};
 
@@ -9,13 +10,13 @@ use jointrig_protocol::sync::{Clock, ClockFault, Edge, Sync};
 use super::error::DeviceError;
 use super::session::Session;
 
-/// The minor of the protocol since which a device knows of clocks and edges.
+/// Minor protocol version that introduced clocks and edges.
 const SINCE: u16 = 2;
-/// A clock is measured in some ms of the device's time.
+/// Timeout for the check of a clock, which takes some ms of device time.
 const MEASURED_WITHIN: Duration = Duration::from_secs(5);
 
 impl Session {
-    /// Clock and edges as they are now; none on a device that knows of no such thing (protocol 1.1 and before).
+    /// Current clock and edges; `None` for a device without them (protocol 1.1 and before).
     pub fn sync(&mut self) -> Result<Option<Sync>, DeviceError> {
         if self.hello.minor < SINCE {
             return Ok(None);
@@ -26,10 +27,12 @@ impl Session {
         }
     }
 
-    /// Lets this clock time the scans of the streams to come, and waits until it has proven good.
+    /// Selects the clock for the scans of later streams, and waits until it was checked
+    /// successfully.
     ///
     /// # Errors
-    /// It does not ([`DeviceError::Clock`] says why), the device's firmware is too old, or the device has no sync port.
+    /// The check fails ([`DeviceError::Clock`] has the reason), the firmware is too old, or the
+    /// device has no sync port.
     pub fn take_clock(&mut self, clock: Clock) -> Result<Sync, DeviceError> {
         if self.hello.minor < SINCE {
             return Err(DeviceError::TooOld {
@@ -45,7 +48,7 @@ impl Session {
             let fault = match self.sync()? {
                 Some(sync) if sync.clock == clock && sync.fault.is_none() => return Ok(sync),
                 Some(Sync { fault: Some(fault), .. }) => fault,
-                // it says that another clock is in use
+                // another clock is in use
                 _ => return Err(self.nonsense("does not take the clock that it was told to take".into())),
             };
             if fault != ClockFault::Unproven || Instant::now() > give_up {
@@ -54,15 +57,16 @@ impl Session {
         }
     }
 
-    /// Lets the sync output pulse once, as soon as it can; the edge is among [`Session::edges`] later.
+    /// Emits one pulse at the sync output as soon as possible; its edge later appears in
+    /// [`Session::edges`].
     ///
     /// # Errors
-    /// No stream runs, or the device has no sync port.
+    /// No stream is running, or the device has no sync port.
     pub fn pulse_output(&mut self) -> Result<(), DeviceError> {
         self.ask_done(Request::Mark)
     }
 
-    /// Edges at the sync input and output since this was asked last.
+    /// Edges at the sync input and output since the last call.
     pub fn edges(&mut self) -> Vec<Edge> {
         std::mem::take(&mut self.inbox.edges)
     }

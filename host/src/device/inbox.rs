@@ -1,4 +1,4 @@
-//! What a device sent, sorted: samples into the stream, answers and events into their queues.
+//! Sorts what a device sent: samples into the stream, answers and events into their queues.
 
 use std::collections::VecDeque;
 
@@ -15,62 +15,64 @@ use super::logs::DeviceLog;
 use super::stream::Stream;
 use super::tap::Tap;
 
-/// Events that wait for somebody to read them; the oldest go first when nobody does.
+/// Most events that wait to be read; the oldest are dropped.
 const EVENTS_KEPT: usize = 256;
 
-/// Answers that wait; one request is under way at a time, and one errand.
+/// Most answers that wait; only one request and one background request are pending at a time.
 const ANSWERS_KEPT: usize = 64;
 
-/// Edges that wait to be taken: more than an input gives in a minute. Those of a session that takes none are not wanted.
+/// Most edges that wait to be read: more than an input delivers in a minute. Further ones are
+/// dropped.
 const EDGES_KEPT: usize = 1 << 18;
 
-/// Everything that arrived in a session and was not used yet.
+/// Everything received in a session and not used yet.
 ///
-/// What arrives before the device has greeted this session is left over from the session before, and is
-/// dropped: a cancelled shot or a failed clock of that session says nothing about this one.
+/// Frames that arrive before the device has sent its hello for this session belong to the previous
+/// session and are dropped: a cancelled shot or a failed clock of that session does not concern
+/// this one.
 #[derive(Default)]
 pub struct Inbox {
     /// The number of this session.
     session: u32,
-    /// Whether the device has greeted this session.
+    /// Whether the device has sent its hello for this session.
     greeted: bool,
-    /// The other end's introduction, or why it is none.
+    /// The device's hello, or why it is invalid.
     pub hello: Option<Result<Hello, Mismatch>>,
-    /// The stream being put together.
+    /// The stream being assembled.
     pub stream: Option<Stream>,
-    /// The stream that was asked for and has not begun.
+    /// The stream that was requested and has not begun.
     pub starting: Option<Starting>,
-    /// Hung on the next stream.
+    /// The tap for the next stream.
     pub tap: Option<Tap>,
     /// Answers in the order of arrival.
     pub answers: VecDeque<answer::Numbered>,
-    /// Events that concern whoever uses the session.
+    /// Events for the session's user.
     pub events: VecDeque<event::Numbered>,
-    /// Edges at the sync input and output that nobody has taken yet.
+    /// Edges at the sync input and output that were not read yet.
     pub edges: Vec<Edge>,
-    /// The external clock is not good any more.
+    /// A fault of the external clock.
     pub clock_fault: Option<ClockFault>,
-    /// The newest word on the last shot.
+    /// The newest report on the last shot.
     pub shot: Option<Shot>,
     /// The newest counters of the device.
     pub counters: Option<Counters>,
-    /// Events that were lost on the way, from the jumps of their numbers.
+    /// Events lost in transmission, counted from gaps in their numbers.
     pub events_lost: u64,
     next_event: Option<u32>,
-    /// Numbers of the newest edges of the input and of the output.
+    /// Numbers of the newest edges at the input and at the output.
     edge_numbers: [Option<u32>; 2],
     /// Sample blocks of another stream, or unreadable ones.
     pub strangers: u64,
-    /// The highest epoch among the strangers.
+    /// The highest epoch among these blocks.
     pub stranger_epoch: Option<u32>,
-    /// The first thing that it said and that cannot be.
+    /// The first impossible statement of the device.
     pub nonsense: Option<String>,
-    /// What the device logs.
+    /// The device's log.
     pub log: DeviceLog,
 }
 
-/// A stream that was asked for: its first blocks follow the answer closely, so that it must begin the
-/// moment the answer is seen.
+/// A stream that was requested. Its first blocks follow the answer immediately, so it must begin as
+/// soon as the answer arrives.
 pub struct Starting {
     /// The request's number.
     pub number: u32,
@@ -83,7 +85,7 @@ pub struct Starting {
 }
 
 impl Inbox {
-    /// Empty, for the session of this number with a device that logs.
+    /// An empty inbox for the session of this number, with the device's log.
     pub fn new(session: u32, log: DeviceLog) -> Self {
         Self { session, log, ..Self::default() }
     }
@@ -134,7 +136,8 @@ impl Inbox {
         self.answers.push_back(answer);
     }
 
-    /// Whether something can be as the device says; what cannot is noted, for the session to end on.
+    /// Whether a statement of the device is possible; an impossible one is noted, and ends the
+    /// session.
     fn holds(&mut self, claim: Claim) -> bool {
         let holds = claim.is_ok();
         self.nonsense = self.nonsense.take().or(claim.err());
@@ -146,7 +149,7 @@ impl Inbox {
             self.strangers += 1;
             return;
         };
-        // without a stream these are the rest of an earlier session's
+        // without a stream these belong to an earlier session
         let Some(stream) = &mut self.stream else { return };
         if !stream.take(&block) {
             self.strangers += 1;
@@ -161,7 +164,7 @@ impl Inbox {
         if let Some(next) = self.next_event {
             let jump = event.number.wrapping_sub(next);
             if jump > u32::MAX / 2 {
-                return; // an old one, twice
+                return; // an older event or a duplicate
             }
             self.events_lost += u64::from(jump);
         }
@@ -207,7 +210,7 @@ impl Inbox {
         }
     }
 
-    /// Notes what a status says in passing.
+    /// Notes the counters and the shot in a status.
     pub fn note_status(&mut self, status: &Status) {
         self.counters = Some(status.counters);
         if let Some(shot) = &status.shot {
@@ -223,7 +226,8 @@ impl Inbox {
         }
     }
 
-    /// Events overtake one another on a bad link: a shot only ever goes forward.
+    /// Notes a shot's phase. Events may overtake one another on a bad link, so a shot never goes
+    /// back to an earlier phase.
     fn note_shot(&mut self, shot: &Shot) {
         let newer = self
             .shot

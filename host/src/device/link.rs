@@ -1,4 +1,4 @@
-//! Frames over a transport: bytes in, whole and undamaged frames out, and the other way round.
+//! Frames over a transport: extracts complete, undamaged frames from bytes, and sends frames.
 
 use std::io;
 use std::time::Duration;
@@ -8,10 +8,10 @@ use jointrig_protocol::packet::Reader;
 
 use super::transport::Transport;
 
-/// Bytes asked for at once: some hundred full blocks.
+/// Bytes read in one call: over a hundred full blocks.
 const READ_BYTES: usize = 65_536;
 
-/// A transport that speaks frames.
+/// A transport that carries frames.
 pub struct Link {
     transport: Box<dyn Transport>,
     reader: Reader,
@@ -22,7 +22,7 @@ pub struct Link {
 }
 
 impl Link {
-    /// Speaks frames over `transport`.
+    /// Sends and receives frames over `transport`.
     pub fn new(transport: Box<dyn Transport>) -> Self {
         Self {
             transport,
@@ -34,18 +34,18 @@ impl Link {
         }
     }
 
-    /// Good frames received.
+    /// Number of good frames received.
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Frames received that were damaged.
+    /// Number of damaged frames received.
     pub fn bad(&self) -> u64 {
         self.bad
     }
 
-    /// Hands every frame that is there to `take`, waiting at most `timeout` for a first byte. Returns
-    /// whether any byte arrived.
+    /// Passes every available frame to `take`, waiting at most `timeout` for the first byte.
+    /// Returns whether any byte arrived.
     pub fn receive(&mut self, timeout: Duration, mut take: impl FnMut(Frame<'_>)) -> io::Result<bool> {
         let got = self.transport.read(&mut self.bytes, timeout)?;
         let mut rest = &self.bytes[..got];
@@ -67,12 +67,12 @@ impl Link {
         Ok(got > 0)
     }
 
-    /// Ends whatever frame the other end believes to be in.
+    /// Ends an incomplete frame at the receiver.
     pub fn end_frame(&mut self) -> io::Result<()> {
         self.transport.write_all(&[0])
     }
 
-    /// Sends a frame of a fixed layout.
+    /// Sends a frame with a payload of fixed layout.
     pub fn send(&mut self, kind: Kind, payload: &[u8]) -> io::Result<()> {
         self.writer.restart(kind);
         let room = self.writer.payload_mut();
@@ -82,7 +82,7 @@ impl Link {
         self.transport.write_all(wire)
     }
 
-    /// Sends a postcard frame.
+    /// Sends a frame with a postcard payload.
     pub fn send_value<T: serde::Serialize>(&mut self, kind: Kind, value: &T) -> io::Result<()> {
         self.writer.restart(kind);
         let wire = self.writer.seal_value(value).map_err(io::Error::other)?;

@@ -1,33 +1,34 @@
-//! The controller's own log: encoded bytes from the link to lines in this program's log.
+//! The controller's log: decodes its bytes from the link into lines of this program's log.
 //!
-//! The bytes mean nothing without the table of strings of the one build that the controller runs
-//! ([`jointrig_logs`]). It is looked for once, when the first line comes: in the image itself where an
-//! emulator was started from one, then in folders. Lines that come before the controller has said what
-//! build it is wait; without a table it is said once where to put it, and the bytes are counted.
+//! Decoding needs the table of strings of the build that the controller runs ([`jointrig_logs`]).
+//! The table is searched for once, when the first line arrives: in the image with which an emulator
+//! was started, then in folders. Lines that arrive before the controller has reported its build
+//! wait. Without a table, one warning states where to put it, and the bytes are counted.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use jointrig_logs::{FOLDER, Line, Table, file_name};
 
-/// Names a folder of tables.
+/// Environment variable that names a folder of tables.
 pub const FOLDER_VARIABLE: &str = "JOINTRIG_LOG_TABLES";
 
-/// Bytes that wait for the build to be known.
+/// Most bytes that wait for the build to be known.
 const WAITING_BYTES: usize = 65_536;
 
-/// Lines kept for whoever stores them; the oldest go first when nobody does.
+/// Most lines kept for the caller; the oldest are dropped.
 const LINES_KEPT: usize = 256;
 
-/// Where tables of log strings are looked for.
+/// Folders in which tables of log strings are searched for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tables {
     folders: Vec<PathBuf>,
 }
 
 impl Tables {
-    /// In `folder`, else in the one that [`FOLDER_VARIABLE`] names; and in any case in [`FOLDER`] beside the folder
-    /// of this program, which is `target/log-tables` for one that cargo has built.
+    /// Searches in `folder`, or else in the folder named by [`FOLDER_VARIABLE`]; and always in
+    /// [`FOLDER`] next to this program's folder, which is `target/log-tables` for a program built
+    /// by cargo.
     pub fn new(folder: Option<PathBuf>) -> Self {
         let named = folder.or_else(|| std::env::var_os(FOLDER_VARIABLE).map(PathBuf::from));
         let program = std::env::current_exe().ok();
@@ -35,15 +36,15 @@ impl Tables {
         Self { folders: named.into_iter().chain(beside.map(|folder| folder.join(FOLDER))).collect() }
     }
 
-    /// In these folders and nowhere else.
+    /// Searches in these folders only.
     pub fn in_folders(folders: Vec<PathBuf>) -> Self {
         Self { folders }
     }
 
-    /// The table of this build: in `image` if that is what it is, or in one of the folders.
+    /// The table of this build: from `image` if it is that build, or from one of the folders.
     ///
     /// # Errors
-    /// A sentence: what was looked at, and what was wrong with it.
+    /// A sentence with the places searched and what was wrong with each.
     fn find(&self, build: u64, image: Option<&Path>) -> Result<Table, String> {
         if image.is_none() && self.folders.is_empty() {
             return Err("no place to look was named".into());
@@ -65,25 +66,25 @@ impl Tables {
     }
 }
 
-/// How far the way from bytes to lines is known.
+/// State of decoding.
 #[derive(Default)]
 enum Reading {
-    /// The controller has not said which build it is.
+    /// The controller has not reported its build.
     #[default]
     BuildUnknown,
-    /// Nothing has come since it has.
+    /// The build is known; no log bytes have arrived since.
     NotLooked(u64),
     With(Box<Table>),
     Without,
 }
 
-/// What one controller says.
+/// The log of one controller.
 #[derive(Default)]
 pub(super) struct DeviceLog {
-    /// What messages call it.
+    /// The device's name in messages.
     address: String,
     pub tables: Tables,
-    /// The image that an emulator was started with.
+    /// The image with which an emulator was started.
     image: Option<PathBuf>,
     reading: Reading,
     waiting: Vec<u8>,
@@ -92,7 +93,7 @@ pub(super) struct DeviceLog {
 }
 
 impl DeviceLog {
-    /// Of the device that messages call `address`, and that was started with `image` where that is known.
+    /// A log for the device named `address` in messages, started with `image` where that is known.
     pub fn of(address: &str, image: Option<&Path>) -> Self {
         Self { address: address.into(), image: image.map(Into::into), ..Self::default() }
     }
@@ -136,7 +137,7 @@ impl DeviceLog {
         }
     }
 
-    /// The controller has said which build it is: what has waited can be read.
+    /// Sets the build that the controller reported, and decodes the bytes that waited for it.
     pub fn know_build(&mut self, build: u64) {
         if matches!(self.reading, Reading::BuildUnknown) {
             self.reading = Reading::NotLooked(build);
@@ -147,12 +148,12 @@ impl DeviceLog {
         }
     }
 
-    /// The lines since the last call, each its level and text.
+    /// The lines since the last call, each with level and text.
     pub fn lines(&mut self) -> Vec<String> {
         self.lines.drain(..).map(|line| format!("{} {}", line.level, line.text)).collect()
     }
 
-    /// Bytes that made no line.
+    /// Bytes that could not be decoded.
     pub fn undecoded(&self) -> u64 {
         self.undecoded
     }

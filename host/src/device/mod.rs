@@ -1,8 +1,8 @@
 //! Devices: addresses, byte transports, sessions, and the records cut from their streams.
 //!
-//! [`address::Address`] opens a [`transport::Transport`]; [`session::Session`] speaks the protocol over it and
-//! puts the stream of scans together again, whatever the link loses; [`recording::Recording`] is one
-//! impact cut from it. Whoever wants to watch the stream itself hangs a [`tap`] on it.
+//! [`address::Address`] opens a [`transport::Transport`]; [`session::Session`] runs the protocol
+//! over it and assembles the stream of scans, whatever the link loses; [`recording::Recording`] is
+//! one impact cut from it. A [`tap`] lets another thread view the stream.
 
 pub mod address;
 pub mod channels;

@@ -1,4 +1,5 @@
-//! `qemu:` and `qemu:IMAGE`: the firmware as a Cortex-M33 binary in the emulator, over the simulated rig.
+//! `qemu:` and `qemu:IMAGE`: the firmware as a Cortex-M33 binary in the emulator, with the
+//! simulated rig.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,13 +11,13 @@ use jointrig_hil_sim::link::HostEnd;
 use super::error::DeviceError;
 use super::transport::Transport;
 
-/// Where the image is, when the address does not say: this variable's value.
+/// Environment variable with the path of the image, used if the address has none.
 pub const IMAGE_VARIABLE: &str = "JOINTRIG_MPS2_IMAGE";
-/// Where it is else, from the folder above this program's: there `cargo xtask firmware` leaves it for a program that cargo
-/// has built.
+/// Path of the image otherwise, relative to the folder above this program's; `cargo xtask firmware`
+/// puts it there for a program built by cargo.
 pub const BUILT: &str = "firmware/thumbv8m.main-none-eabihf/release/mps2-an505";
 
-/// The image that `cargo xtask firmware` has built beside this program, if any.
+/// The image that `cargo xtask firmware` has built next to this program, if any.
 fn built() -> Option<PathBuf> {
     let program = std::env::current_exe().ok()?;
     let image = program.parent()?.parent()?.join(BUILT);
@@ -27,12 +28,13 @@ fn built() -> Option<PathBuf> {
 pub struct Qemu {
     image: PathBuf,
     link: HostEnd,
-    // dropped after the link: the emulator ends then
+    // declared after the link, so that it is dropped after it: dropping it ends the emulator
     board: QemuBoard,
 }
 
 impl Qemu {
-    /// Starts the emulator with this image, or with the one that [`IMAGE_VARIABLE`] names, or with the one [`BUILT`].
+    /// Starts the emulator with this image, or the one named by [`IMAGE_VARIABLE`], or the one at
+    /// [`BUILT`].
     ///
     /// # Errors
     /// [`DeviceError::Open`] when there is no image or the emulator does not start.
@@ -53,7 +55,7 @@ impl Qemu {
         Ok(Self { image, link, board })
     }
 
-    /// The reason why the emulator ended, where it is known, instead of a bare broken pipe.
+    /// Replaces a broken pipe by the reason why the emulator ended, where it is known.
     fn explained(&self, error: io::Error) -> io::Error {
         match self.board.failure() {
             Some(why) => io::Error::new(error.kind(), why),

@@ -1,25 +1,25 @@
-//! A record: every channel around one impact, as raw codes.
+//! A record: the raw codes of every channel around one impact.
 
 use std::ops::Range;
 
 use jointrig_protocol::shot::Shot;
 
-/// One impact as it was measured: raw codes, never changed afterwards.
+/// One impact as measured; the raw codes are never changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// The stream that it was cut from.
+    /// Epoch of the stream from which it was cut.
     pub epoch: u32,
-    /// Scan index of the first sample in that stream.
+    /// Scan index of its first sample in that stream.
     pub first_scan: u64,
-    /// Samples before the trigger: the trigger is at this index.
+    /// Number of samples before the trigger, which is also the trigger's index.
     pub trigger_index: usize,
-    /// Channels.
+    /// Number of channels.
     pub channels: usize,
-    /// Raw codes, channel after channel (the link brings them scan after scan).
+    /// Raw codes, one channel after another (the link delivers one scan after another).
     pub codes: Vec<i16>,
-    /// Samples that were lost for good, as index ranges; their codes are 0 and mean nothing.
+    /// Index ranges of samples that were lost for good; their codes are 0 and invalid.
     pub gaps: Vec<Range<usize>>,
-    /// What the device says about the shot.
+    /// The device's report on the shot.
     pub shot: Shot,
 }
 
@@ -29,7 +29,7 @@ impl Recording {
         self.codes.len().checked_div(self.channels).unwrap_or(0)
     }
 
-    /// Its samples, to look at.
+    /// A view of its samples.
     pub fn view(&self) -> Codes<'_> {
         Codes { codes: &self.codes, channels: self.channels }
     }
@@ -40,12 +40,12 @@ impl Recording {
     }
 }
 
-/// A look at the samples of a record, wherever they are kept.
+/// A view of the samples of a record.
 #[derive(Clone, Copy, Debug)]
 pub struct Codes<'a> {
-    /// Raw codes, channel after channel.
+    /// Raw codes, one channel after another.
     pub codes: &'a [i16],
-    /// Channels.
+    /// Number of channels.
     pub channels: usize,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Codes<'a> {
     }
 }
 
-/// Turns codes from scan after scan into channel after channel.
+/// Reorders codes from one scan after another to one channel after another.
 pub fn by_channel(scan_major: &[i16], channels: usize) -> Vec<i16> {
     let mut out = Vec::with_capacity(scan_major.len());
     for place in 0..channels {

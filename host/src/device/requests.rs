@@ -1,4 +1,4 @@
-//! What a session's user may ask, and waiting for what comes of it.
+//! Requests of a session's user, and waiting for their results.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -17,16 +17,16 @@ use super::session::{Session, TRIES, patience};
 use super::stream::{Accounts, Stream};
 use super::tap::Tap;
 
-/// The minor of the protocol since which a device can be told scales.
+/// Minor protocol version that introduced scales.
 const SCALES_SINCE: u16 = 1;
 
-/// The minor of the protocol since which a device can be asked for slow values.
+/// Minor protocol version that introduced slow values.
 const SLOW_SINCE: u16 = 1;
 
 /// Longest wait for a first byte within one pump.
 const POLL: Duration = Duration::from_millis(20);
 
-/// The slowest clock of a device, of which a running stream's scans tell, against the host's.
+/// Slowest progress of a running stream, relative to the host's clock.
 const SLOWEST: f64 = 1e-3;
 
 fn name(request: &Request) -> &'static str {
@@ -55,7 +55,8 @@ fn name(request: &Request) -> &'static str {
 }
 
 impl Session {
-    /// Asks, repeats under the same number until there is an answer, and returns it.
+    /// Sends a request, repeats it under the same number until it is answered, and returns the
+    /// answer.
     ///
     /// # Errors
     /// A refusal, no answer, a broken link.
@@ -97,7 +98,7 @@ impl Session {
         }
     }
 
-    /// Who the device is.
+    /// The device's description.
     pub fn info(&mut self) -> Result<Info, DeviceError> {
         match self.ask(Request::Info)? {
             Answer::Info(info) => {
@@ -110,7 +111,7 @@ impl Session {
         }
     }
 
-    /// Every channel of the scan. The map's id is that of the next stream ([`Session::start`]).
+    /// Requests the description of every channel of the scan. The map's id is 0.
     pub fn channels(&mut self, info: &Info) -> Result<ChannelMap, DeviceError> {
         let mut channels = Vec::with_capacity(info.channels.into());
         for index in 0..info.channels {
@@ -125,11 +126,13 @@ impl Session {
         Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, exact_hz: None, channels })
     }
 
-    /// From now on the device judges trigger, quiet, limits and amplitudes by the scales of these channels, whatever sensitivities it was
-    /// built with; `device` is what it says of them itself ([`Session::channels`]). It forgets them with the session.
+    /// Makes the device apply the scales of these channels to trigger, quiet check, limits and
+    /// amplitudes instead of its built-in sensitivities; `device` holds the scales that it reports
+    /// itself ([`Session::channels`]). It forgets them when the session ends.
     ///
     /// # Errors
-    /// It cannot be told so ([`DeviceError::TooOld`]), or refuses: a scale is more than a factor of 100 away from the one built in.
+    /// The firmware is too old ([`DeviceError::TooOld`]), or the device refuses: a scale differs
+    /// from the built-in one by more than a factor of 100.
     pub fn calibrate(&mut self, device: &ChannelMap, calibrated: &ChannelMap) -> Result<(), DeviceError> {
         fn scales(map: &ChannelMap) -> impl Iterator<Item = f32> {
             // no device has more channels than a request has scales
@@ -150,7 +153,7 @@ impl Session {
         self.ask_done(Request::Scales { units_per_volt: scales(calibrated).collect() })
     }
 
-    /// How the device is.
+    /// The device's status.
     pub fn status(&mut self) -> Result<Status, DeviceError> {
         match self.ask(Request::Status)? {
             Answer::Status(status) => Ok(status),
@@ -158,8 +161,8 @@ impl Session {
         }
     }
 
-    /// What the device measures slowly: the specimen's temperature, the supplies of its sensors. None on a device that knows of no such thing
-    /// (protocol 1.0).
+    /// The device's slow values: the specimen's temperature, the supplies of its sensors. `None`
+    /// for a device without them (protocol 1.0).
     pub fn slow(&mut self) -> Result<Option<Slow>, DeviceError> {
         if self.hello.minor < SLOW_SINCE {
             return Ok(None);
@@ -178,12 +181,12 @@ impl Session {
         Ok(self.slow()?.and_then(|slow| slow.temperature_c).map(f64::from))
     }
 
-    /// Lets somebody watch the next stream ([`Session::start`]).
+    /// Attaches a tap to the next stream ([`Session::start`]).
     pub fn watch(&mut self, tap: Tap) {
         self.inbox.tap = Some(tap);
     }
 
-    /// Begins a new stream of scans of `channels` channels; returns its epoch and first scan.
+    /// Starts a new stream of scans of `channels` channels; returns its epoch and first scan.
     pub fn start(&mut self, channels: usize) -> Result<(u32, u64), DeviceError> {
         if let Some(tap) = self.inbox.stream.take().and_then(Stream::into_tap) {
             self.inbox.tap = Some(tap);
@@ -196,10 +199,12 @@ impl Session {
         }
     }
 
-    /// Ends the stream, fetches what is still missing of it, and closes its accounts with the device's own.
+    /// Ends the stream, fetches its missing scans, and completes its accounts with the device's
+    /// counters.
     ///
     /// # Errors
-    /// A broken link, or missing scans that never came.
+    /// A broken link, a restarted device, or missing scans that do not arrive
+    /// (see [`Session::wait_for`]).
     pub fn finish(&mut self) -> Result<Accounts, DeviceError> {
         let Some(stream) = &self.inbox.stream else { return Ok(Accounts::default()) };
         let epoch = stream.epoch();
@@ -218,17 +223,18 @@ impl Session {
         Ok(self.accounts())
     }
 
-    /// Waits until every scan before `scan` has arrived or is known to be lost. Time is the device's: a slow
-    /// or virtual device is waited for as long as it makes progress.
+    /// Waits until every scan before `scan` has arrived or is known to be lost. Time is the
+    /// device's: the wait for a slow or virtual device lasts as long as it makes progress.
     ///
     /// # Errors
-    /// A broken link, a restarted device, next to no progress for 30 s, a scan more than an hour ahead.
+    /// A broken link, a restarted device, almost no progress for 30 s, a scan more than an hour
+    /// ahead.
     pub fn wait_for(&mut self, scan: u64) -> Result<(), DeviceError> {
         self.wait_until(scan, |_| false).map(|_| ())
     }
 
-    /// Waits as [`Session::wait_for`] does, or until `stop` says so after some bytes; returns whether it
-    /// was `stop`.
+    /// Waits as [`Session::wait_for`] does, or until `stop`, called after each reception, returns
+    /// true; returns whether it did.
     ///
     /// # Errors
     /// As [`Session::wait_for`].
@@ -237,7 +243,8 @@ impl Session {
         scan: u64,
         mut stop: impl FnMut(&Self) -> bool,
     ) -> Result<bool, DeviceError> {
-        // a virtual board that stands still for want of an acknowledgement would send nothing until the line counts as idle
+        // a virtual board that waits for an acknowledgement would otherwise send nothing until the
+        // line counts as idle
         self.acknowledge()?;
         let mut progress = (self.expected()?, Instant::now());
         if scan.saturating_sub(progress.0) > (claims::AHEAD_S * self.rate_hz) as u64 {
@@ -246,7 +253,7 @@ impl Session {
                 "says that something happens at scan {scan}, more than {hours} h after scan {now}, which came last"
             )));
         }
-        // a virtual device's time may be slow, and is still a thousandth of ours
+        // virtual time may be slow, but runs at no less than a thousandth of real time
         let least = (self.stalled.as_secs_f64() * self.rate_hz * SLOWEST).max(1.0) as u64;
         loop {
             if stop(self) {
@@ -270,7 +277,8 @@ impl Session {
         }
     }
 
-    /// With next to no new scan for so long, a running stream counts as stalled; 30 s unless it is said otherwise.
+    /// Sets how long almost no new scans may arrive before a running stream counts as stalled; 30 s
+    /// by default.
     pub fn stalls_after(&mut self, quiet: Duration) {
         self.stalled = quiet;
     }
@@ -281,7 +289,7 @@ impl Session {
         stream.map(Stream::expected).ok_or_else(|| DeviceError::NoStream { address: self.address.clone() })
     }
 
-    /// The codes of `range` (scan after scan) and its gaps; see [`Stream::cut`].
+    /// The codes of `range` (one scan after another) and its gaps; see [`Stream::cut`].
     pub fn cut(&self, range: Range<u64>) -> Result<(Vec<i16>, Vec<Range<usize>>), DeviceError> {
         let stream = self.inbox.stream.as_ref();
         stream
@@ -289,41 +297,41 @@ impl Session {
             .ok_or_else(|| DeviceError::NoStream { address: self.address.clone() })
     }
 
-    /// How many scans of `range` are lost for good.
+    /// Number of scans in `range` that are lost for good.
     pub fn lost_in(&self, range: &Range<u64>) -> u64 {
         let lost = self.inbox.stream.as_ref().map_or(&[][..], Stream::lost);
         let within = |lost: &Range<u64>| lost.end.min(range.end).saturating_sub(lost.start.max(range.start));
         lost.iter().map(within).sum()
     }
 
-    /// The samples before `scan` are not needed any more.
+    /// Releases the samples before `scan`.
     pub fn forget_before(&mut self, scan: u64) {
         if let Some(stream) = &mut self.inbox.stream {
             stream.forget_before(scan);
         }
     }
 
-    /// How the force pulse is recognised.
+    /// Sets how the force pulse is recognised.
     pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), DeviceError> {
         self.ask_done(Request::Trigger(trigger))
     }
 
-    /// The load cells' 3 × 3 calibration matrix, row-major, dimensionless.
+    /// Sets the load cells' 3 × 3 calibration matrix, row-major, dimensionless.
     pub fn set_load_cells(&mut self, matrix: [f32; 9]) -> Result<(), DeviceError> {
         self.ask_done(Request::LoadCells { matrix })
     }
 
-    /// Allows one shot within `valid_ms` of the device's time.
+    /// Allows one shot within `valid_ms` of device time.
     pub fn arm(&mut self, valid_ms: u32) -> Result<(), DeviceError> {
         self.ask_done(Request::Arm { valid_ms })
     }
 
-    /// Takes back arming and any shot whose coil is not on yet.
+    /// Cancels arming and any shot whose coil is not on yet.
     pub fn disarm(&mut self) -> Result<(), DeviceError> {
         self.ask_done(Request::Disarm)
     }
 
-    /// One shot of the hammer.
+    /// Requests one shot of the hammer.
     pub fn fire(&mut self, fire: Fire) -> Result<(), DeviceError> {
         match self.ask(Request::Fire(fire))? {
             Answer::Scheduled { .. } => Ok(()),
@@ -331,7 +339,8 @@ impl Session {
         }
     }
 
-    /// Tells a virtual rig where hammer and laser are; returns the first scan for which that holds.
+    /// Sets the positions of hammer and laser on a virtual rig; returns the first scan for which
+    /// they hold.
     pub fn stage(&mut self, stage: Stage) -> Result<u64, DeviceError> {
         match self.ask(Request::Stage(stage))? {
             Answer::Staged { at_scan } => Ok(at_scan),

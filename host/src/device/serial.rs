@@ -1,4 +1,4 @@
-//! `serial:PATH`: the controller's serial port, or a pseudo-terminal that stands for it.
+//! `serial:PATH`: the controller's serial port, or a pseudo-terminal in its place.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -9,10 +9,10 @@ use serialport::{ErrorKind, SerialPort};
 use super::error::{DeviceError, INSTALL_UDEV_RULE};
 use super::transport::Transport;
 
-/// Any rate will do: USB serial ports ignore it.
+/// Any rate works: USB serial ports ignore it.
 const BAUD: u32 = 921_600;
 
-/// How long a write may wait for a device that does not take bytes.
+/// Longest wait of a write for a device that accepts no bytes.
 const WRITE_PATIENCE: Duration = Duration::from_secs(5);
 
 /// An open serial port.
@@ -22,7 +22,7 @@ pub struct Serial {
 }
 
 impl Serial {
-    /// Opens `path` and tells the device that somebody listens.
+    /// Opens `path` and sets DTR, which tells the device that a host is listening.
     ///
     /// # Errors
     /// [`DeviceError::Open`]; "permission denied" names the udev rule.
@@ -41,7 +41,7 @@ impl Serial {
             };
             DeviceError::Open { address: format!("serial:{name}"), why }
         })?;
-        // A pseudo-terminal has no modem lines; a USB port starts to send only once DTR is up.
+        // A pseudo-terminal has no modem lines; a USB port only sends once DTR is set.
         if let Err(error) = port.write_data_terminal_ready(true) {
             log::debug!("serial:{name}: DTR cannot be set ({error}); taken for a pseudo-terminal");
         }

@@ -1,17 +1,18 @@
-//! A session with a device: handshake, requests that arrive once, samples that arrive all.
+//! A session with a device: handshake, requests that are executed exactly once, and a complete
+//! stream of samples.
 //!
-//! One pump does everything that the link needs ([`Session::pump`]); whoever waits for something pumps.
+//! [`Session::pump`] does everything that the link needs; every function that waits calls it.
 //!
-//! - **Requests** carry a number and are repeated under the *same* number until they are answered: the
-//!   device answers a duplicate from memory. One is under way at a time.
-//! - **Samples** are put together by [`Stream`]; what is missing is asked for again, each time under a new
-//!   number, because asking twice does no harm.
-//! - **Acknowledgement** is cumulative and never passes the scan at which it is held
-//!   ([`Session::hold_acknowledgement`]). A virtual board's time stands still half a ring beyond it,
-//!   which is what makes a campaign repeatable. While the line is idle it is sent again: it is the
-//!   host's sign of life.
+//! - **Requests** carry a number and are repeated under the *same* number until they are answered;
+//!   the device answers a duplicate from memory. Only one is pending at a time.
+//! - **Samples** are assembled by [`Stream`]. Missing ones are requested again, each time under a
+//!   new number, because a repeated request does no harm.
+//! - **Acknowledgements** are cumulative and never pass the scan at which they are held
+//!   ([`Session::hold_acknowledgement`]). The time of a virtual board stops half a ring beyond that
+//!   scan, which makes a campaign repeatable. While the line is idle, the acknowledgement is
+//!   repeated as the host's sign of life.
 //!
-//! Timeouts are wall time and only ever decide when to ask again, never what is measured.
+//! Timeouts are wall-clock time; they only decide when to ask again, never what is measured.
 
 use std::hash::{BuildHasher, Hasher};
 use std::io;
@@ -36,22 +37,22 @@ use super::transport::{Simulated, Transport};
 /// The line counts as idle when nothing arrived for this long.
 const IDLE: Duration = Duration::from_millis(20);
 
-/// What was asked for again and did not come is asked for anew after this long without any byte.
+/// Missing scans are requested again after this long without any byte …
 const RESEND_IDLE: Duration = Duration::from_millis(50);
 
-/// … or after this much of the scan clock, s.
+/// … or after this much time of the scan clock, s.
 const RESEND_CLOCK_S: f64 = 0.05;
 
-/// The device is asked how it is when the line stays idle for this long.
+/// The device's status is requested when the line is idle for this long.
 const STATUS_IDLE: Duration = Duration::from_millis(100);
 
-/// A gap that was asked for this often and never came is entered as lost.
+/// A gap that was requested this many times without success is recorded as lost.
 const RESEND_TRIES: u32 = 100;
 
-/// With next to no new scan for this long, a running stream counts as stalled.
+/// A running stream counts as stalled when almost no new scans arrive for this long.
 const STALLED: Duration = Duration::from_secs(30);
 
-/// Something asked for in the background, not by the session's user.
+/// A request that the session makes itself and no caller waits for.
 #[derive(Clone, Debug)]
 enum Errand {
     Resend { number: u32, range: Range<u64>, asked: Instant, newest: u64, answered: bool },
@@ -66,17 +67,17 @@ pub struct Session {
     simulated: Option<Simulated>,
     pub(super) hello: Hello,
     pub(super) next_number: u32,
-    /// The number for which a caller waits.
+    /// Number of the request that a caller waits for.
     pub(super) waiting: Option<u32>,
     pub(super) reply: Option<answer::Numbered>,
     pub(super) rate_hz: f64,
     pub(super) stalled: Duration,
     pub(super) ended: bool,
-    /// How many statuses have said that the stream ended unasked.
+    /// Number of statuses that reported an unrequested end of the stream.
     ends_told: u32,
-    /// Whether the device was told other scales than its own.
+    /// Whether the device was given scales other than its own.
     pub(super) scaled: bool,
-    /// Whether the shaker may be moving at this session's order.
+    /// Whether the shaker may be moving because of this session's order.
     pub(super) shakes: bool,
     errand: Option<Errand>,
     resend_tries: (u64, u32),
@@ -89,10 +90,10 @@ pub struct Session {
 }
 
 impl Session {
-    /// Shakes hands over `transport`. `address` is what errors call the device.
+    /// Performs the handshake over `transport`. `address` is the device's name in errors.
     ///
     /// # Errors
-    /// No answer, or another version: both are named.
+    /// No answer, or another version; the error names both.
     pub fn open(transport: Box<dyn Transport>, address: &str) -> Result<Self, DeviceError> {
         let now = Instant::now();
         let log = DeviceLog::of(address, transport.image());
@@ -129,7 +130,7 @@ impl Session {
 
     fn shake_hands(&mut self) -> Result<(), DeviceError> {
         let ours = self.hello;
-        // a zero first: it ends whatever half a frame an earlier session left behind
+        // a zero first: it ends an incomplete frame of an earlier session
         self.link.end_frame().map_err(|error| self.broken("shaking hands", error))?;
         for patience in patience() {
             self.link
@@ -153,33 +154,34 @@ impl Session {
         Err(DeviceError::NoAnswer { address: self.address.clone(), request: "hello", tries: TRIES })
     }
 
-    /// What the device is known to be when it is simulated in this process.
+    /// The rig's description when the device is simulated in this process.
     pub fn simulated(&self) -> Option<&Simulated> {
         self.simulated.as_ref()
     }
 
-    /// What errors call the device.
+    /// The device's name in errors.
     pub fn address(&self) -> &str {
         &self.address
     }
 
-    /// Where the table of the device's log strings is looked for; to be said before [`Session::info`], by which
-    /// its build becomes known. Without it, only in the image of an emulator.
+    /// Sets where the table of the device's log strings is searched for; call it before
+    /// [`Session::info`], which reports the build. Otherwise only an emulator's image is searched.
     pub fn look_for_log_tables(&mut self, tables: Tables) {
         self.inbox.log.tables = tables;
     }
 
-    /// What the device has logged since the last call, each line its level and text; some hundred are kept.
+    /// The device's log since the last call, one string of level and text per line; the last few
+    /// hundred are kept.
     pub fn log_lines(&mut self) -> Vec<String> {
         self.inbox.log.lines()
     }
 
-    /// Bytes of the device's log that made no line: damaged, or without a table.
+    /// Bytes of the device's log that could not be decoded: damaged, or without a table.
     pub fn undecoded_log_bytes(&self) -> u64 {
         self.inbox.log.undecoded()
     }
 
-    /// The device's introduction.
+    /// The device's hello.
     pub fn hello(&self) -> &Hello {
         &self.hello
     }
@@ -189,12 +191,12 @@ impl Session {
         u64::from(self.hello.ring_scans)
     }
 
-    /// The newest word on the last shot.
+    /// The newest report on the last shot.
     pub fn shot(&self) -> Option<Shot> {
         self.inbox.shot
     }
 
-    /// Where every scan of the stream went so far.
+    /// Counts of received, recovered and lost scans so far.
     pub fn accounts(&self) -> Accounts {
         self.inbox.stream.as_ref().map(Stream::accounts).unwrap_or_default()
     }
@@ -204,14 +206,14 @@ impl Session {
         (self.link.frames(), self.link.bad())
     }
 
-    /// Never acknowledge beyond scan `at` until told otherwise; a virtual board then stands still at most
-    /// half a ring beyond it. `None` lets go.
+    /// Never acknowledges beyond scan `at` until this is called again; a virtual board then stops
+    /// at most half a ring beyond it. `None` removes the limit.
     pub fn hold_acknowledgement(&mut self, at: Option<u64>) {
         self.hold = at;
     }
 
-    /// Moves bytes: reads what is there (waiting at most `timeout` for a first one), sorts it, and does what
-    /// the link needs (acknowledge, ask again).
+    /// Moves bytes: reads what is available (waiting at most `timeout` for the first byte),
+    /// processes it, and sends what the link needs (acknowledgements, repeated requests).
     ///
     /// # Errors
     /// The link broke, or the device restarted.
@@ -281,7 +283,8 @@ impl Session {
                         *newest = stream.newest();
                     }
                     Err(Refusal::Gone { oldest }) => {
-                        // not even the first one is held: at least one scan further, or nothing would end
+                        // the device does not even hold the first scan: advance by at least one
+                        // scan so that this ends
                         let end = if oldest > range.start { oldest.min(range.end) } else { range.end };
                         stream.mark_lost(range.start..end);
                         self.errand = None;
@@ -298,7 +301,8 @@ impl Session {
         Ok(())
     }
 
-    /// The scan after the stream's last: a converter that runs on after the end produces scans that belong to no stream.
+    /// The scan after the stream's last one. After the end of a stream the converter may run on;
+    /// those scans do not belong to it.
     pub(super) fn end_of_stream(&self, status: &Status) -> u64 {
         let stream = self.inbox.stream.as_ref().filter(|stream| self.ended && stream.epoch() == status.epoch);
         let counters = &status.counters;
@@ -309,7 +313,8 @@ impl Session {
 
     fn check_epoch(&mut self, status: &Status) -> Result<(), DeviceError> {
         let Some(stream) = self.inbox.stream.as_ref().filter(|_| !self.ended) else { return Ok(()) };
-        // answers overtake events: why a stream has ended may be told behind the first status that says that it has
+        // answers may overtake events: the reason why a stream ended may arrive after the first
+        // status that reports its end
         self.ends_told += u32::from(!status.streaming);
         if self.ends_told > 1 || status.epoch != stream.epoch() { Err(self.restarted()) } else { Ok(()) }
     }
@@ -323,7 +328,8 @@ impl Session {
         let now = Instant::now();
         let due = fresh >= step || (fresh > 0 && self.hold == Some(up_to));
         let idle = now - self.last_bytes >= IDLE && now - self.last_ack >= IDLE;
-        // a steady trickle is no idle line, but the device must still hear its host
+        // a slow but steady flow of data never makes the line idle, but the device must still
+        // receive a sign of life
         let silent = now - self.last_ack >= 10 * IDLE;
         if due || idle || silent {
             let bytes = Acknowledge { epoch: stream.epoch(), next_scan: up_to }.to_bytes();
@@ -334,7 +340,7 @@ impl Session {
         Ok(())
     }
 
-    /// Asks for what is missing, and how the device is when the line stays idle.
+    /// Requests missing scans, and the status when the line stays idle.
     fn run_errands(&mut self) -> Result<(), DeviceError> {
         let Some(stream) = &mut self.inbox.stream else { return Ok(()) };
         let now = Instant::now();
@@ -389,7 +395,7 @@ impl Session {
         Ok(())
     }
 
-    /// Sends a request that nobody waits for.
+    /// Sends a request that no caller waits for.
     pub(super) fn background(&mut self, request: Request) -> Result<u32, DeviceError> {
         let number = self.next_number;
         self.next_number += 1;
@@ -423,15 +429,16 @@ impl Drop for Session {
     }
 }
 
-/// How often a request is sent before the device counts as gone.
+/// How often a request is sent before the device counts as not answering.
 pub(super) const TRIES: u32 = 10;
 
-/// How long each try waits: 200 ms, growing, so that a loaded machine is not taken for a dead device.
+/// Wait of each try: 200 ms, increasing, so that a loaded computer is not mistaken for a dead
+/// device.
 pub(super) fn patience() -> impl Iterator<Item = Duration> {
     (0..TRIES).map(|attempt| Duration::from_millis(200 * u64::from(1 + attempt)))
 }
 
-/// A number that no other session had; it decides nothing but whose answers these are.
+/// A number that differs between sessions; it only serves to recognise this session's answers.
 fn nonce() -> u32 {
     let mut hasher = std::hash::RandomState::new().build_hasher();
     hasher.write_u32(std::process::id());

@@ -1,8 +1,8 @@
-//! The shaker from the host's side: an order, its renewal, rest.
+//! The shaker from the host's side: order, renewal and rest.
 //!
-//! An order holds for a bounded time of the device's own clock and must be renewed ([`Session::shake`] again). A session that ends
-//! while the shaker may be moving sends it to rest; one that is killed cannot, and then the device does so itself after a
-//! second of silence.
+//! An order is valid for a limited time of the device's clock and must be renewed by another
+//! [`Session::shake`]. A session that ends while the shaker may be moving orders it to rest. If the
+//! process is killed, the device does so itself after one second without a message.
 
 use jointrig_protocol::answer::Shaker;
 use jointrig_protocol::event::{Event, Reason};
@@ -12,20 +12,21 @@ use super::error::DeviceError;
 use super::session::Session;
 
 impl Session {
-    /// Orders a sine, or renews or changes the one that runs.
+    /// Orders a sine, or renews or changes the current one.
     ///
     /// # Errors
-    /// The device refuses it (no shaker, open guard, out of bounds), or is gone.
+    /// The device refuses it (no shaker, open guard, out of bounds) or does not answer.
     pub fn shake(&mut self, order: Shake) -> Result<(), DeviceError> {
-        // before it is answered: an answer that is lost leaves a shaker that moves
+        // set before the answer: if the answer is lost, the shaker may be moving
         self.shakes = true;
         self.ask_done(Request::Shake(order))
     }
 
-    /// Has the shaker come to rest, over a ramp. [`Session::shaker_rests`] says when it has.
+    /// Orders the shaker to rest, over a ramp. [`Session::shaker_rests`] reports when it is at
+    /// rest.
     ///
     /// # Errors
-    /// The device is gone; it comes to rest by itself then.
+    /// The device does not answer; the shaker then comes to rest by itself.
     pub fn rest(&mut self) -> Result<(), DeviceError> {
         self.ask_done(Request::Rest)?;
         self.shakes = false;
@@ -35,12 +36,12 @@ impl Session {
     /// Whether the shaker is at rest now.
     ///
     /// # Errors
-    /// The device is gone.
+    /// The device does not answer.
     pub fn shaker_rests(&mut self) -> Result<bool, DeviceError> {
         Ok(self.status()?.shaker == Shaker::Resting)
     }
 
-    /// Why the shaker stopped since this was asked last, if it did. Other events wait for whoever wants them.
+    /// Why the shaker stopped since the last call, if it did. Other events stay in the queue.
     pub fn shaker_stopped(&mut self) -> Option<Reason> {
         let mut reason = None;
         self.inbox.events.retain(|numbered| match numbered.event {
@@ -54,7 +55,7 @@ impl Session {
         reason
     }
 
-    /// Sends the shaker to rest without waiting for an answer: the last thing that an ending session says.
+    /// Orders the shaker to rest without waiting for an answer; called when a session ends.
     pub(super) fn rest_at_last(&mut self) {
         if self.shakes
             && let Err(error) = self.background(Request::Rest)

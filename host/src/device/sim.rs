@@ -1,7 +1,8 @@
-//! `sim:` and `sim:RIG.toml`: the simulated rig, in this process.
+//! `sim:` and `sim:RIG.toml`: the simulated rig in this process.
 //!
-//! The only place where the host knows of the simulator; what it gets is bytes, as from any device. Beside them it is told what the rig's
-//! parameters would have an ideal measurement find: that goes into the campaign file, and no estimator reads it.
+//! The only place where the host depends on the simulator; it receives bytes as from any device. It
+//! also receives the values that an ideal measurement would find for the rig's parameters. They go
+//! into the campaign file, and no estimator reads them.
 
 use std::io;
 use std::path::Path;
@@ -21,15 +22,15 @@ use super::transport::{Simulated, Transport};
 pub struct Sim {
     link: HostEnd,
     simulated: Simulated,
-    // dropped after the link: its thread ends then
+    // declared after the link, so that it is dropped after it: its thread then ends
     _board: VirtualBoard,
 }
 
 impl Sim {
-    /// Starts the rig that the file describes, or the built-in one.
+    /// Starts the rig described in the file, or the built-in one.
     ///
     /// # Errors
-    /// [`DeviceError::Open`] with what is wrong with the description, and where.
+    /// [`DeviceError::Open`] with the error in the description, and where.
     pub fn open(rig: Option<&Path>, seed: u64) -> Result<Self, DeviceError> {
         let address = || rig.map_or_else(|| "sim:".into(), |path| format!("sim:{}", path.display()));
         let open = |why: String| DeviceError::Open { address: address(), why };

@@ -1,8 +1,8 @@
-//! The sample stream put back together: strictly in scan order, each scan once, every loss on record.
+//! Assembles the sample stream strictly in scan order, each scan once, and records every loss.
 //!
-//! Blocks may be lost, doubled, late or sent again. What comes early is held; what is missing is named by
-//! [`Stream::missing`], so that the session can ask for it; what the device says is gone for good is
-//! entered as a lost range, and the stream goes on behind it.
+//! Blocks may be lost, duplicated, late or sent again. Early blocks are held; [`Stream::missing`]
+//! names the missing scans, so that the session can request them; scans that the device reports as
+//! lost for good are recorded as a lost range, and the stream continues after it.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,35 +11,35 @@ use jointrig_protocol::block::{Block, RESENT};
 
 use super::tap::Tap;
 
-/// Where every scan of a stream went. In the end `sent = received + recovered + lost`.
+/// Counts of a stream's scans. At the end `sent = received + recovered + lost`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Accounts {
-    /// Scans that arrived when they were sent first.
+    /// Scans that arrived when first sent.
     pub received: u64,
-    /// Scans that arrived because they were asked for again.
+    /// Scans that arrived after a repeated request.
     pub recovered: u64,
     /// Scans that the device reported as lost for good.
     pub lost: u64,
     /// Scans that arrived more than once and were ignored.
     pub duplicates: u64,
-    /// Scans that the device says it produced.
+    /// Scans that the device produced according to its counters.
     pub sent: u64,
 }
 
 impl Accounts {
-    /// Scans of which nobody knows where they went; anything but 0 at the end of a stream is a fault.
+    /// Scans that are unaccounted for; any value but 0 at the end of a stream is an error.
     pub fn unexplained(&self) -> u64 {
         self.sent.abs_diff(self.received + self.recovered + self.lost)
     }
 }
 
-/// Codes that the tape holds when scans are lost: 20 s of the fastest rig's, 256 MB.
+/// Most codes on the tape when scans are lost: 20 s of the fastest rig, 256 MB.
 const TAPE_KEPT: u64 = 1 << 27;
 
-/// Ranges of lost scans that may wait for the scans before them.
+/// Most ranges of lost scans that wait for the scans before them.
 const GONE_KEPT: usize = 4096;
 
-/// A stream being put together.
+/// A stream being assembled.
 pub struct Stream {
     epoch: u32,
     map: u8,
@@ -51,7 +51,7 @@ pub struct Stream {
     newest: u64,
     tail: u64,
     held: BTreeMap<u64, Held>,
-    /// Scans of all that is held.
+    /// Number of scans held.
     held_scans: u64,
     gone: Vec<Range<u64>>,
     lost: Vec<Range<u64>>,
@@ -68,8 +68,8 @@ struct Held {
 }
 
 impl Stream {
-    /// An empty stream of `channels` channels whose first scan is `first_scan`; `ring_scans` is what the
-    /// device can send again.
+    /// An empty stream of `channels` channels whose first scan is `first_scan`; `ring_scans` is the
+    /// number of scans that the device can send again.
     pub fn new(epoch: u32, map: u8, first_scan: u64, channels: usize, ring_scans: u32) -> Self {
         Self {
             epoch,
@@ -91,7 +91,7 @@ impl Stream {
         }
     }
 
-    /// Lets somebody watch: every scan goes through `tap` too, `rate_hz` of them each second.
+    /// Attaches a tap, which receives every scan; `rate_hz` is the scan rate.
     pub fn tapped(&mut self, tap: Option<Tap>, rate_hz: f64) {
         self.tap = tap;
         if let Some(tap) = &mut self.tap {
@@ -99,7 +99,7 @@ impl Stream {
         }
     }
 
-    /// The tap, for the next stream.
+    /// Returns the tap for the next stream.
     pub fn into_tap(self) -> Option<Tap> {
         self.tap
     }
@@ -114,17 +114,17 @@ impl Stream {
         self.first_scan
     }
 
-    /// The next scan that has not arrived; everything before it has, or is lost for good.
+    /// The next scan that has not arrived; all scans before it have arrived or are lost for good.
     pub fn expected(&self) -> u64 {
         self.expected
     }
 
-    /// The scan after the newest one seen: the scan clock as far as the host knows it.
+    /// The scan after the newest one received: the scan clock as far as the host knows it.
     pub fn newest(&self) -> u64 {
         self.newest
     }
 
-    /// Where every scan went so far.
+    /// Counts of received, recovered and lost scans so far.
     pub fn accounts(&self) -> Accounts {
         self.accounts
     }
@@ -160,8 +160,8 @@ impl Stream {
         true
     }
 
-    /// Enters scans that the device can never send (again). What has arrived stays.
-    /// False when more such ranges wait for their turn than a stream has room for.
+    /// Records scans that the device can never send (again). Scans that have arrived stay. Returns
+    /// false when the list of ranges waiting for their turn is full.
     pub fn mark_lost(&mut self, range: Range<u64>) -> bool {
         if range.end > self.expected && range.start < range.end {
             if self.gone.len() == GONE_KEPT {
@@ -174,8 +174,8 @@ impl Stream {
         true
     }
 
-    /// The device produced scans up to `next_scan` and nothing more is on its way: what has not
-    /// arrived of whole blocks (of every block, when `ended`) is missing.
+    /// Notes that the device produced scans up to `next_scan` and nothing more is under way: whole
+    /// blocks that have not arrived (when `ended`, partial ones too) are missing.
     pub fn note_tail(&mut self, next_scan: u64, ended: bool) {
         let block = jointrig_protocol::limits::scans_per_block(self.channels).unwrap_or(1) as u64;
         let behind = next_scan.saturating_sub(self.expected);
@@ -185,7 +185,7 @@ impl Stream {
         }
     }
 
-    /// The first scans that are known to be missing, for the session to ask for.
+    /// The first scans known to be missing, for the session to request.
     pub fn missing(&self) -> Option<Range<u64>> {
         let seen = self.held.first_key_value().map_or(self.tail, |(first, _)| *first);
         let end = self.gone.first().map_or(seen, |range| seen.min(range.start));
@@ -208,7 +208,7 @@ impl Stream {
         }
     }
 
-    /// Goes on over everything that is held or known to be lost.
+    /// Advances over all scans that are held or known to be lost.
     fn advance(&mut self) {
         loop {
             while self.gone.first().is_some_and(|range| range.end <= self.expected) {
@@ -247,9 +247,10 @@ impl Stream {
         }
         self.expected = end;
         self.newest = self.newest.max(end);
-        // a host's memory is not a device's to fill: behind many zeros the tape begins anew, as it does where nobody forgets it
+        // bounds the memory that a faulty device can claim: after a long gap the tape starts again
+        // behind it, also if the caller never releases samples
         if scans > self.bound || self.tape.len() as u64 + scans * self.channels as u64 > TAPE_KEPT {
-            // nobody needs that many zeros: the tape begins anew behind the gap
+            // too many zeros to keep: the tape starts again after the gap
             self.tape.clear();
             self.tape_first = end;
         } else {
@@ -257,10 +258,11 @@ impl Stream {
         }
     }
 
-    /// Forgets the samples before `scan`.
+    /// Releases the samples before `scan`.
     pub fn forget_before(&mut self, scan: u64) {
         let scan = scan.clamp(self.tape_first, self.expected);
-        // moving the tape costs its length: let half of it grow stale first
+        // moving the tape costs time proportional to its length, so wait until half of it is
+        // released
         let stale = (scan - self.tape_first) as usize * self.channels;
         if stale > self.tape.len() / 2 {
             self.tape.drain(..stale);
@@ -268,8 +270,8 @@ impl Stream {
         }
     }
 
-    /// The codes of `range`, scan after scan, and which of its scans are missing (as indices into it, their
-    /// codes 0).
+    /// The codes of `range`, one scan after another, and the missing scans as index ranges into it;
+    /// their codes are 0.
     pub fn cut(&self, range: Range<u64>) -> (Vec<i16>, Vec<Range<usize>>) {
         let mut codes = vec![0; (range.end - range.start) as usize * self.channels];
         let there = range.start.max(self.tape_first)..range.end.min(self.expected);

@@ -1,8 +1,10 @@
-//! A look at the stream as it comes: the least and the largest code of every channel in each millisecond, for whoever watches.
+//! A view of the running stream: the smallest and the largest code of every channel in each
+//! millisecond.
 //!
-//! The end that folds ([`Tap`]) belongs to the thread that measures: it has fixed memory, allocates nothing and never waits. What it has folded
-//! it hands over when somebody asks, by swapping two buffers; while nobody does, it goes on folding and its stretches get coarser. The end
-//! that looks ([`View`]) belongs to another thread.
+//! The writing end ([`Tap`]) belongs to the measuring thread: its memory is fixed, it allocates
+//! nothing and never waits. It hands its data over on request by swapping two buffers; without
+//! requests it continues, and its stretches get coarser. The reading end ([`View`]) belongs to
+//! another thread.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, TryLockError};
@@ -11,25 +13,27 @@ use std::time::{Duration, Instant};
 
 use jointrig_protocol::limits::MAX_CHANNELS;
 
-/// Most stretches of one envelope: two frames of a screen at their finest. Even, so that pairs can be joined.
+/// Most stretches of one envelope: two frames of a screen at the finest resolution. Even, so that
+/// pairs can be joined.
 pub const MOST_STRETCHES: usize = 64;
 
-/// A stretch at its finest, s.
+/// Duration of a stretch at the finest resolution, s.
 const FINEST_S: f64 = 1e-3;
 
-/// A stretch without any scan: its least code is above its largest.
+/// A stretch without any scan: its smallest code is greater than its largest.
 pub const NOTHING: [i16; 2] = [i16::MAX, i16::MIN];
 
-/// A piece of the stream: the least and the largest code of each channel in each of its stretches.
+/// A section of the stream: the smallest and the largest code of each channel in each of its
+/// stretches.
 #[derive(Clone, Debug)]
 pub struct Envelope {
-    /// Channels of a scan.
+    /// Channels per scan.
     pub channels: usize,
     /// The first scan.
     pub first_scan: u64,
-    /// Scans of each stretch.
+    /// Scans per stretch.
     pub scans_per_stretch: u32,
-    /// Stretches.
+    /// Number of stretches.
     pub stretches: usize,
     ends: Box<[[i16; 2]]>,
     /// Scans that arrived; the others of the envelope are lost.
@@ -58,17 +62,18 @@ impl Envelope {
         (self.sums, self.squares) = ([0; MAX_CHANNELS], [0; MAX_CHANNELS]);
     }
 
-    /// Least and largest code, channel by channel within each stretch; [`NOTHING`] where every scan was lost.
+    /// Smallest and largest code, channel by channel within each stretch; [`NOTHING`] where every
+    /// scan was lost.
     pub fn ends(&self) -> &[[i16; 2]] {
         &self.ends[..self.stretches * self.channels]
     }
 
-    /// Sum and sum of squares of the codes of one channel over what arrived.
+    /// Sum and sum of squares of one channel's codes over the scans that arrived.
     pub fn sums(&self, channel: usize) -> (i64, u64) {
         (self.sums.get(channel).copied().unwrap_or(0), self.squares.get(channel).copied().unwrap_or(0))
     }
 
-    /// Joins the stretches by pairs.
+    /// Joins the stretches in pairs.
     fn coarsen(&mut self) {
         let channels = self.channels;
         for stretch in 0..self.stretches / 2 {
@@ -83,7 +88,7 @@ impl Envelope {
     }
 }
 
-/// What is handed over: the buffer, and whether it holds something that was not looked at yet.
+/// The buffer that is handed over, and whether it was not read yet.
 struct Slot {
     envelope: Box<Envelope>,
     fresh: bool,
@@ -95,23 +100,23 @@ struct Shared {
     looks: OnceLock<Thread>,
 }
 
-/// The end that folds.
+/// The writing end.
 pub struct Tap {
     shared: Arc<Shared>,
     making: Box<Envelope>,
     finest: u32,
-    /// The stretch under way, and how many of its scans are over.
+    /// Codes of the current stretch, and how many of its scans are done.
     open: [[i16; 2]; MAX_CHANNELS],
     over: u32,
 }
 
-/// The end that looks.
+/// The reading end.
 pub struct View {
     shared: Arc<Shared>,
     own: Box<Envelope>,
 }
 
-/// Both ends.
+/// Creates both ends.
 pub fn tap() -> (Tap, View) {
     let empty = || Box::new(Envelope::empty());
     let shared = Arc::new(Shared {
@@ -125,7 +130,7 @@ pub fn tap() -> (Tap, View) {
 }
 
 impl Tap {
-    /// A new stream begins with `first_scan`; what was in the making is forgotten.
+    /// Begins a new stream at `first_scan`; an incomplete envelope is discarded.
     pub fn begin(&mut self, channels: usize, first_scan: u64, rate_hz: f64) {
         let channels = channels.min(MAX_CHANNELS);
         self.finest = ((FINEST_S * rate_hz).round() as u32).max(1);
@@ -137,7 +142,7 @@ impl Tap {
         (self.open, self.over) = ([NOTHING; MAX_CHANNELS], 0);
     }
 
-    /// Folds the next scans; `codes` are scan after scan.
+    /// Adds the next scans; `codes` holds one scan after another.
     pub fn fold(&mut self, mut codes: &[i16]) {
         let channels = self.making.channels;
         if channels == 0 {
@@ -161,7 +166,7 @@ impl Tap {
         }
     }
 
-    /// The next `scans` scans are lost.
+    /// Marks the next `scans` scans as lost.
     pub fn skip(&mut self, scans: u64) {
         let making = &self.making;
         if making.channels == 0 {
@@ -169,7 +174,7 @@ impl Tap {
         }
         let room = u64::from(making.scans_per_stretch) * MOST_STRETCHES as u64;
         if scans > room {
-            // nobody needs a screen full of nothing: a new envelope begins behind it
+            // longer than an envelope: start a new one after the gap
             let at = making.first_scan
                 + making.stretches as u64 * u64::from(making.scans_per_stretch)
                 + u64::from(self.over);
@@ -185,7 +190,7 @@ impl Tap {
         }
     }
 
-    /// So many scans of the open stretch are over.
+    /// Advances by `scans` scans, which do not exceed the current stretch.
     fn advance(&mut self, scans: u32) {
         self.over += scans;
         if self.over < self.making.scans_per_stretch {
@@ -201,7 +206,7 @@ impl Tap {
         }
         if self.making.stretches == MOST_STRETCHES {
             if self.making.scans_per_stretch > u32::MAX / 2 {
-                // days without anybody looking
+                // not read for days
                 let end =
                     self.making.first_scan + MOST_STRETCHES as u64 * u64::from(self.making.scans_per_stretch);
                 self.restart(self.making.channels, end);
@@ -211,7 +216,8 @@ impl Tap {
         }
     }
 
-    /// Swaps buffers, unless somebody holds the other one at this very moment: the next stretch will do.
+    /// Swaps the buffers, unless the other one is locked at this moment; then the next stretch
+    /// tries again.
     fn hand_over(&mut self) {
         let mut slot = match self.shared.slot.try_lock() {
             Ok(slot) => slot,
@@ -234,7 +240,8 @@ impl Tap {
 }
 
 impl View {
-    /// Asks for what was folded since the last look, and waits at most `patience` for it. To be called from one thread alone.
+    /// Requests the data since the last call and waits at most `patience` for them. Call it from
+    /// one thread only.
     pub fn next(&mut self, patience: Duration) -> Option<&Envelope> {
         self.shared.looks.get_or_init(std::thread::current);
         let until = Instant::now() + patience;

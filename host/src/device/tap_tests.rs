@@ -2,14 +2,14 @@ use super::*;
 
 const AT_ONCE: Duration = Duration::ZERO;
 
-/// Scans of two channels that rise and fall.
+/// Scans of two channels, one rising and one falling.
 fn scans(range: std::ops::Range<i32>) -> Vec<i16> {
     range.flat_map(|scan| [scan as i16, -(scan as i16)]).collect()
 }
 
 fn begun() -> (Tap, View) {
     let (mut tap, view) = tap();
-    // 4 scans are a millisecond
+    // 4 scans per millisecond
     tap.begin(2, 100, 4_000.0);
     (tap, view)
 }
@@ -18,13 +18,14 @@ fn begun() -> (Tap, View) {
 fn each_stretch_has_its_least_and_its_largest_code() {
     let (mut tap, mut view) = begun();
     assert!(view.next(AT_ONCE).is_none(), "nothing was folded");
-    // blocks that fit no stretch
+    // blocks that do not align with stretches
     tap.fold(&scans(0..3));
     tap.fold(&scans(3..9));
     let seen = view.next(AT_ONCE).expect("a stretch is whole");
     assert_eq!((seen.first_scan, seen.scans_per_stretch, seen.stretches), (100, 4, 1));
     assert_eq!(seen.ends(), [[0, 3], [-3, 0]]);
-    // the envelope was handed over at the first stretch after the question; what came later is the next one's
+    // the envelope was handed over at the first stretch after the request; later data belong to the
+    // next one
     assert!(view.next(AT_ONCE).is_none());
     tap.fold(&scans(9..12));
     let seen = view.next(AT_ONCE).expect("two stretches");
@@ -55,7 +56,7 @@ fn who_looks_late_sees_everything_coarser() {
     assert_eq!(seen.arrived, (all + 16) as u64);
     let whole = seen.ends().iter().step_by(2).fold(NOTHING, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     assert_eq!(whole, [0, (all + 15) as i16]);
-    // then it is as fine as before
+    // then the resolution is fine again
     assert!(view.next(AT_ONCE).is_none());
     tap.fold(&scans(0..4));
     assert_eq!(view.next(AT_ONCE).expect("one more").scans_per_stretch, 4);
@@ -72,14 +73,15 @@ fn lost_scans_leave_a_hole_and_time_goes_on() {
     let seen = view.next(AT_ONCE).expect("three stretches");
     assert_eq!((seen.stretches, seen.arrived), (3, 4));
     assert_eq!(seen.ends(), [[0, 1], [-1, 0], NOTHING, NOTHING, [10, 11], [-11, -10]]);
-    // a gap longer than a screen begins anew behind it
+    // after a gap longer than an envelope a new one begins
     tap.skip(1_000_000);
     assert!(view.next(AT_ONCE).is_none());
     tap.fold(&scans(0..4));
     assert_eq!(view.next(AT_ONCE).expect("behind it").first_scan, 100 + 12 + 1_000_000);
 }
 
-/// One end folds as fast as it can, the other looks now and then: every scan is seen once, in order.
+/// One thread writes as fast as it can, the other reads now and then: every scan is read once, in
+/// order.
 #[test]
 fn nothing_is_seen_twice_and_nothing_is_left_out() {
     let (mut tap, mut view) = tap();
@@ -100,7 +102,8 @@ fn nothing_is_seen_twice_and_nothing_is_left_out() {
     };
     look(&mut view);
     let mut tap = folds.join().expect("folds");
-    // what was in the making when nobody folded any more: a look asks for it, and the next whole stretch hands it over
+    // a call requests the data left after the writer stopped; the next complete stretch hands them
+    // over
     look(&mut view);
     while tap.over != 0 || tap.making.stretches > 0 {
         let rest = tap.making.scans_per_stretch - tap.over;

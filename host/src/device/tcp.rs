@@ -1,4 +1,4 @@
-//! `tcp:HOST:PORT`: a device behind a socket (a virtual board, or a bridge).
+//! `tcp:HOST:PORT`: a device connected by a socket (a virtual board, or a bridge).
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -19,7 +19,7 @@ impl Tcp {
     /// Connects to `place`, given as `host:port`.
     ///
     /// # Errors
-    /// [`DeviceError::Open`] with the reason and what to do.
+    /// [`DeviceError::Open`] with the cause and what to do.
     pub fn open(place: &str) -> Result<Self, DeviceError> {
         let open = |why: String| DeviceError::Open { address: format!("tcp:{place}"), why };
         let mut last = None;

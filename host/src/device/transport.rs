@@ -1,39 +1,40 @@
-//! Bytes to and from a device, whatever carries them.
+//! Byte transport to and from a device.
 
 use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-/// A byte pipe to one device. It owes nobody frames: bytes may arrive in any portion, and may be lost.
+/// A byte pipe to one device. It does not preserve frames: bytes may arrive in pieces of any size,
+/// and may be lost.
 pub trait Transport: Send {
-    /// Reads what is there into `buf`, waiting at most `timeout` for a first byte.
+    /// Reads the available bytes into `buf`, waiting at most `timeout` for the first one.
     ///
-    /// Returns how many bytes were read; 0 means that nothing arrived in time.
+    /// Returns the number of bytes read; 0 means that nothing arrived in time.
     ///
     /// # Errors
-    /// The device or its cable is gone.
+    /// The device or its cable was disconnected.
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Writes all of `bytes`.
     ///
     /// # Errors
-    /// The device or its cable is gone.
+    /// The device or its cable was disconnected.
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Whether what the device sends arrives in the packets in which it was sent. A device may then leave byte stuffing out
+    /// Whether the device's packets arrive as they were sent. A device may then omit byte stuffing
     /// ([`jointrig_protocol::packet`]).
     fn keeps_packets(&self) -> bool {
         false
     }
 
-    /// The image that the device at the other end was started with, where that is known: its log strings
-    /// are in it.
+    /// The firmware image with which the device was started, where it is known; it contains the log
+    /// strings.
     fn image(&self) -> Option<&Path> {
         None
     }
 
-    /// What the device is known to be beforehand when it is simulated in this process; none for whatever else may be at the
-    /// other end. It comes from the rig's parameters, and over no wire.
+    /// The rig's description when the device is simulated in this process; `None` for any other
+    /// device. It is taken from the rig's parameters and is not transmitted over the link.
     fn simulated(&self) -> Option<Simulated> {
         None
     }
@@ -44,9 +45,9 @@ pub trait Transport: Send {
 pub struct Simulated {
     /// The rig's name.
     pub rig: String,
-    /// Its seed.
+    /// The seed of its scatter.
     pub seed: u64,
-    /// SHA-256 of all its parameters, in base64.
+    /// SHA-256 of all its parameters, base64.
     pub parameters: String,
     /// What an ideal measurement of it would find, as JSON.
     pub truth: serde_json::Value,

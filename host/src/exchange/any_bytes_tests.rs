@@ -1,4 +1,4 @@
-//! npz, csv and xlsx: what is written is read, and damaged files are refused without a panic.
+//! npz, csv and xlsx: written files are read back, and damaged files are refused without a panic.
 
 use super::npz::NpzFile;
 use super::npz_output::NpzOutput;
@@ -12,7 +12,7 @@ use std::path::Path;
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/positions");
 
-/// Every reader of single files, on these bytes.
+/// Runs every reader of single files on these bytes.
 fn read_all(bytes: &[u8]) -> usize {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
     fs::write(file.path(), bytes).expect("writable");
@@ -92,7 +92,8 @@ proptest! {
             }
             fs::write(folder.path().join(from.file_name().expect("a name")), bytes).expect("writable");
         }
-        // a changed figure is still a figure; anything else is named by table, row and column
+        // a changed digit is still a digit; any other change is an error that names table, row and
+        // column
         if let Err(error) = read_positions(folder.path()) {
             prop_assert!(!error.to_string().is_empty());
         }

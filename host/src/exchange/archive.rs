@@ -1,4 +1,4 @@
-//! A zip archive from elsewhere: opened only when its list of members is one that can be held.
+//! Opens untrusted zip archives only if their list of members is of a bounded length.
 
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -12,9 +12,9 @@ use crate::foreign;
 /// Most members of an archive.
 const MOST_MEMBERS: u64 = 4096;
 
-/// What begins an entry of the list of members.
+/// Signature of an entry of the central directory (the list of members).
 const ENTRY: &[u8] = b"PK\x01\x02";
-/// What begins the end of that list in a large archive, and how long it is.
+/// Signature and length of the zip64 end of central directory record.
 const END_OF_LARGE: &[u8] = b"PK\x06\x06";
 const END_OF_LARGE_BYTES: usize = 56;
 
@@ -24,15 +24,17 @@ pub(super) type Opened = (ZipArchive<BufReader<File>>, u64);
 /// Opens the archive at `path`.
 ///
 /// # Errors
-/// As [`foreign::open`]; [`ErrorKind::InvalidData`] for what is no zip archive, or lists too many members.
+/// As [`foreign::open`]; [`ErrorKind::InvalidData`] for a file that is not a zip archive or lists
+/// too many members.
 pub(super) fn open(path: &Path) -> io::Result<Opened> {
     let (mut file, size) = foreign::open(path)?;
     refuse_long_lists(&mut file, size)?;
     Ok((ZipArchive::new(BufReader::new(file))?, size))
 }
 
-/// Whoever opens an archive makes room for all members that it claims or lists, before anybody can ask how many there are: so they are
-/// counted first, by what every entry must begin with.
+/// Counts the members by the signature of their entries before the archive is opened: the zip
+/// reader allocates memory for all members that an archive claims or lists, before their number can
+/// be checked.
 fn refuse_long_lists(file: &mut File, size: u64) -> io::Result<()> {
     let refused = |what: String| Err(io::Error::new(ErrorKind::InvalidData, what));
     let (entry, end) = (memmem::Finder::new(ENTRY), memmem::Finder::new(END_OF_LARGE));
@@ -41,7 +43,7 @@ fn refuse_long_lists(file: &mut File, size: u64) -> io::Result<()> {
         let read = file.read(&mut buffer[kept..])?;
         let there = &buffer[..kept + read];
         let last = read == 0;
-        // what begins in the last bytes is looked at together with what follows it
+        // a signature in the last bytes is examined together with the next block
         let done = if last { there.len() } else { there.len().saturating_sub(END_OF_LARGE_BYTES) };
         members += entry.find_iter(there).filter(|at| *at < done).count() as u64;
         if members > MOST_MEMBERS {
@@ -52,7 +54,8 @@ fn refuse_long_lists(file: &mut File, size: u64) -> io::Result<()> {
                 let bytes = there.get(at + from..at + from + 8).and_then(|bytes| bytes.try_into().ok());
                 bytes.map_or(0, u64::from_le_bytes)
             };
-            // the same four bytes among values are followed by a length that no file has
+            // the same four bytes within compressed data are followed by a length that exceeds the
+            // file's size
             let claimed = word(24).max(word(32));
             if word(4) <= size && claimed > MOST_MEMBERS {
                 return refused(format!(

@@ -1,5 +1,5 @@
-//! The channels of a cell's hits beside force and response (specimens, load cells, excitation), for other programs: in the same order of
-//! hits as the file of its force and response.
+//! Exports the channels of a cell's hits other than force and response (specimens, load cells,
+//! excitation), in the same order of hits as the file of force and response.
 
 use super::frf_uff::{FrfUffError, write_uff};
 use super::npz_output::NpzOutput;
@@ -14,20 +14,20 @@ use std::path::Path;
 /// Longest name of an entity in a universal file, characters.
 const ENTITY: usize = 10;
 
-/// What was measured beside force and response.
+/// The channels of a cell's hits other than force and response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelRecords {
     /// Sampling rate, Hz.
     pub fs_hz: f64,
     /// Each channel's name.
     pub names: Vec<String>,
-    /// What each measures, in SI.
+    /// The quantity of each channel, in SI.
     pub quantities: Vec<Quantity>,
-    /// By how much each is late, s: (hit, channel).
+    /// Delay of each channel, s: (hit, channel).
     pub delay_s: Vec<Vec<f64>>,
-    /// Id of each hit's record.
+    /// Record id of each hit.
     pub records: Vec<i64>,
-    /// The signals, as measured: (hit, channel, sample).
+    /// The measured signals: (hit, channel, sample).
     pub signals: Vec<Vec<Vec<f64>>>,
 }
 
@@ -37,7 +37,8 @@ impl ChannelRecords {
     }
 }
 
-/// As npz: `fs` (Hz), `record` (hit), `names` (channel), `units` (channel), `delay_s` (hit, channel), `signals` (hit, channel, sample) in SI.
+/// Writes npz: `fs` (Hz), `record` (hit), `names` (channel), `units` (channel), `delay_s` (hit,
+/// channel), `signals` (hit, channel, sample) in SI.
 ///
 /// # Errors
 /// [`NpzError::Write`]; [`NpzError::Content`] when hits differ in length.
@@ -56,10 +57,11 @@ pub fn write_npz(path: &Path, all: &ChannelRecords) -> Result<(), NpzError> {
     out.finish()
 }
 
-/// As time responses, hit after hit: the entity is the channel's name, the identification the record and the channel's delay.
+/// Writes a universal file of time responses, one hit after another: the entity is the channel's
+/// name; the identification holds the record and the channel's delay.
 ///
 /// # Errors
-/// What does not fit the format, or the disk's.
+/// The data does not fit the format, or the file cannot be written.
 pub fn write_uff_file(path: &Path, all: &ChannelRecords) -> Result<(), FrfUffError> {
     let header = Header { program: "jointrig".into(), ..Header::default() };
     let mut sets = vec![DataSet::Header(header), DataSet::Units(Units::si())];
@@ -97,7 +99,8 @@ fn kind_of(measured: Quantity) -> i64 {
     }
 }
 
-/// As text: `record`, `time_s`, and a column `NAME_UNIT` for each channel, hit after hit.
+/// Writes comma-separated text: `record`, `time_s`, and a column `NAME (UNIT)` for each channel,
+/// one hit after another.
 ///
 /// # Errors
 /// [`TableError`].

@@ -1,4 +1,5 @@
-//! An FRF file of either form: npz, or a universal file. Its first bytes tell which, not its name.
+//! Reads an FRF file of either format, npz or universal file. Its first bytes determine the format,
+//! not its name.
 
 use super::frf_npz::read_labelled;
 use super::frf_uff::{FrfUffError, read_frf_uff};
@@ -10,23 +11,23 @@ use crate::{advice, foreign};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Why a file gives no FRFs.
+/// Why FRFs could not be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FrfFileError {
-    /// It cannot be read at all.
+    /// The file cannot be read.
     #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
     Open {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
-    /// It is of a format that is known and not read.
+    /// The file has a known format that is not supported.
     #[error("{}: {said}", path.display())]
     OtherFormat {
         /// The file.
         path: PathBuf,
-        /// What it is, and how to make an npz of it.
+        /// The format, and how to convert the file to npz.
         said: String,
     },
     /// It is an npz file that holds no FRFs.
@@ -50,7 +51,7 @@ pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
     Ok(first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06"))
 }
 
-/// Refuses a file of another program's format, naming it and how to make an npz of it.
+/// Refuses a file of another program's format, naming the format and how to convert it to npz.
 ///
 /// # Errors
 /// [`FrfFileError::OtherFormat`], [`FrfFileError::Open`].
@@ -62,7 +63,7 @@ pub(super) fn refuse_other_formats(path: &Path, wanted: Contents) -> Result<(), 
     }
 }
 
-/// Reads FRFs from an npz or a universal file, in SI. `stated` units count instead of the file's.
+/// Reads FRFs from an npz or a universal file, in SI. `stated` units override the file's.
 ///
 /// # Errors
 /// [`FrfFileError`] with the file and what is wrong in it.

@@ -1,7 +1,8 @@
-//! FRFs in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`, `inputs`.
-//! Optional are `sigma`, the damping of the exponential window in 1/s (absent means 0); `variance` of the
-//! real part of each value and `coherence`, both shaped like `frf`; `unit` of the values, `unit_frequency`;
-//! and `output_direction`, `input_direction`: ±1, 2, 3 along x, y, z, 0 where none is told.
+//! FRFs in npz: `frequency` (line) Hz, `frf` (line, output, input), `quantity`, `outputs`,
+//! `inputs`. Optional are `sigma`, the damping of the exponential window in 1/s (0 where it is
+//! missing); `variance` of the real part of each value and `coherence`, both shaped like `frf`;
+//! `unit` of the values, `unit_frequency`; and `output_direction`, `input_direction`: ±1, 2, 3
+//! along x, y, z, 0 where unknown.
 
 use super::direction::turned_words;
 use super::labelled_frf::{Label, LabelledFrf};
@@ -14,7 +15,8 @@ use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::path::Path;
 
-/// Further arrays that go into an FRF file by their own names, each (line, output) or (line, output, input).
+/// Additional arrays of an FRF file under their own names, each (line, output) or (line, output,
+/// input).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Extra {
     /// Real, e.g. `coherence`, `variance`.
@@ -23,11 +25,11 @@ pub enum Extra {
     Complex(String, Array<Complex<f64>>),
 }
 
-/// Bytes of memory of a line's matrix beside its values.
+/// Bytes that the matrix of a line takes in addition to its values.
 const LINE: u64 = 64;
 
-/// Reads an FRF file in SI, with variance and coherence where it has them. Values may be NaN: they are
-/// checked where a cell is used. A coherence of another shape than the FRFs' is passed over.
+/// Reads an FRF file in SI, with variance and coherence where it has them. Values may be NaN: they
+/// are checked where a cell is used. A coherence of another shape than the FRFs' is ignored.
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
@@ -35,10 +37,10 @@ pub fn read_frf(path: &Path) -> Result<Frf, NpzError> {
     read_labelled(path, &StatedUnits::default()).map(|read| read.frf)
 }
 
-/// The same with what the file says of directions; `stated` units count instead of the file's.
+/// As [`read_frf`], together with the file's directions; `stated` units override the file's.
 ///
 /// # Errors
-/// As [`read_frf`]; also for units that are not known or contradict the quantity.
+/// As [`read_frf`]; also for units that are unknown or contradict the quantity.
 pub fn read_labelled(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, NpzError> {
     let mut file = NpzFile::open(path)?;
     file.refuse_other_units(&["unit", "unit_frf", "unit_frequency"])?;
@@ -73,7 +75,7 @@ pub fn read_labelled(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, N
     if factor != 1.0 {
         frf.values.iter_mut().for_each(|v| *v *= factor);
     }
-    // chunks of zero length are not allowed; an FRF without rows or columns has empty matrices
+    // `chunks` panics on length zero; an FRF without rows or columns has empty matrices
     let lines = if rows * columns == 0 {
         vec![DMatrix::zeros(rows, columns); frequency_hz.len()]
     } else {
@@ -123,7 +125,7 @@ pub fn read_labelled(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, N
     Ok(LabelledFrf { taken, ..read })
 }
 
-/// The factor of the values to SI, and what they are for a person.
+/// The factor from the values to SI, and a description of their unit.
 fn frf_factor(
     file: &mut NpzFile,
     quantity: MotionQuantity,
@@ -157,7 +159,7 @@ fn frf_factor(
     }
 }
 
-/// What an array of directions says, one for each name.
+/// Labels with the directions of an array, one for each name.
 fn directions(file: &mut NpzFile, array: &str, names: &[String]) -> Result<Vec<Label>, NpzError> {
     let expected = "±1, 2 or 3 along x, y or z for each name, 0 where none is told";
     let all = if file.has(array) { file.real(array, expected)?.values } else { vec![0.0; names.len()] };
@@ -181,13 +183,13 @@ fn directions(file: &mut NpzFile, array: &str, names: &[String]) -> Result<Vec<L
     names.iter().zip(all).map(label).collect()
 }
 
-/// The directions of a file's labels as arrays beside the FRFs; none where no label says any.
+/// The directions of a file's labels as additional arrays; empty where no label has one.
 pub fn direction_arrays(read: &LabelledFrf) -> Vec<Extra> {
     let along = |labels: &[Label]| labels.iter().map(|label| label.direction).collect::<Vec<_>>();
     direction_extras(&along(&read.outputs), &along(&read.inputs))
 }
 
-/// Directions of outputs and inputs as arrays beside the FRFs, where any is told.
+/// Directions of outputs and inputs as additional arrays, where any is known.
 pub fn direction_extras(outputs: &[i64], inputs: &[i64]) -> Vec<Extra> {
     let array = |name: &str, directions: &[i64]| {
         let values: Vec<f64> = directions.iter().map(|direction| *direction as f64).collect();
@@ -201,7 +203,7 @@ fn shape(frf: &Frf) -> (usize, usize, usize) {
     (frf.lines().len(), frf.outputs().len(), frf.inputs().len())
 }
 
-/// Whether there is one number for each value; FRFs of a single impact have no axis of inputs.
+/// Whether there is one number for each value; FRFs of a single impact may omit the input axis.
 fn fits(array: &Array<f64>, frf: &Frf) -> bool {
     let (lines, rows, columns) = shape(frf);
     let alike = array.shape == [lines, rows, columns] || (columns == 1 && array.shape == [lines, rows]);
@@ -212,12 +214,12 @@ fn by_line(array: &Array<f64>, rows: usize, columns: usize) -> Vec<DMatrix<f64>>
     array.values.chunks(rows * columns).map(|line| DMatrix::from_row_slice(rows, columns, line)).collect()
 }
 
-/// Writes an FRF file with the coherence and variance that are known, and further arrays beside it.
+/// Writes an FRF file with its coherence and variance where known, and additional arrays.
 ///
 /// # Errors
 /// [`NpzError::Write`].
 pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzError> {
-    // every bit of an FRF's numbers is in use: two of three files would grow
+    // not compressed: FRF values use all their bits, and two of three files would grow
     let mut out = NpzOutput::create(path)?.unpacked();
     out.real("frequency", &[frf.frequency_hz().len()], frf.frequency_hz())?;
     let (lines, rows, columns) = shape(frf);
@@ -240,7 +242,7 @@ pub fn write_frf(path: &Path, frf: &Frf, extras: &[Extra]) -> Result<(), NpzErro
     out.finish()
 }
 
-/// (line, output, input) in C order: row after row of matrices that hold column after column.
+/// (line, output, input) in C order: the matrices are stored by columns and read out by rows.
 fn in_c_order<T: nalgebra::Scalar>(lines: &[DMatrix<T>]) -> impl Iterator<Item = &T> {
     lines.iter().flat_map(|y| {
         let rows = y.nrows();
@@ -273,7 +275,7 @@ mod tests {
         assert!(NpzFile::open(&path).expect("open").has("coherence"));
     }
 
-    /// A small file with these arrays beside those that every file has.
+    /// A small file with the required arrays and those that `write` adds.
     fn with(path: &Path, quantity: &str, write: impl FnOnce(&mut NpzOutput)) {
         let mut out = NpzOutput::create(path).expect("writable");
         out.real("frequency", &[2], [1.0, 2.0]).expect("written");

@@ -1,11 +1,11 @@
 //! FRF matrices in universal files: one function of type 4 for each pair of output and input.
 //!
-//! The response entity is the sensor, its direction (1, 2, 3) the axis: outputs are called `A1:x` where
-//! a sensor has several, else `A1`. A value along a negative axis is turned. The reference entity is the
-//! impact; its direction is signed, and the value is per force along it. The ordinate's type is 8, 11 or
-//! 12 (receptance, mobility, accelerance), the denominator's 13; labels and data set 164 give the units.
-//! The damping of an exponential window, which the format has no field for, is in text 4 as
-//! `sigma 2.3 1/s`.
+//! The response entity is the sensor, its direction (1, 2, 3) the axis: outputs are named `A1:x`
+//! where a sensor has several axes, else `A1`. A value along a negative axis changes its sign. The
+//! reference entity is the impact; its direction is signed, and the value is per force along it.
+//! The ordinate's type is 8, 11 or 12 (receptance, mobility, accelerance), the denominator's 13;
+//! labels and data set 164 give the units. The format has no field for the damping of an
+//! exponential window, so it is in text 4 as `sigma 2.3 1/s`.
 
 use super::direction::turned_words;
 use super::labelled_frf::{Label, LabelledFrf};
@@ -22,15 +22,15 @@ use num_complex::Complex;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Why a universal file does not give FRFs.
+/// Why FRFs could not be read from, or written to, a universal file.
 #[derive(Debug, thiserror::Error)]
 pub enum FrfUffError {
-    /// The file cannot be read at all.
+    /// The file cannot be read.
     #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
     Open {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The file cannot be written.
@@ -38,10 +38,10 @@ pub enum FrfUffError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// What is in it is no FRF matrix.
+    /// The contents are not an FRF matrix.
     #[error("{}: {reason}", path.display())]
     Content {
         /// The file.
@@ -51,40 +51,40 @@ pub enum FrfUffError {
     },
 }
 
-/// Reads the FRFs of a universal file into one matrix, outputs and inputs in the order of their first
-/// appearance, values in SI. Missing pairs hold NaN. `stated` units count instead of the file's.
+/// Reads the FRFs of a universal file into one matrix in SI, outputs and inputs in the order of
+/// their first appearance. Missing pairs hold NaN. `stated` units override the file's.
 ///
 /// # Errors
-/// [`FrfUffError`] when there is no FRF, when units contradict one another or are not known, or when
-/// FRFs differ in lines, quantity or damping.
+/// [`FrfUffError`] when there is no FRF, when units contradict one another or are not known, or
+/// when FRFs differ in lines, quantity or damping.
 pub fn read_frf_uff(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, FrfUffError> {
     from_contents(&contents(path)?, stated)
         .map_err(|reason| FrfUffError::Content { path: path.into(), reason })
 }
 
-/// The functions of a universal file and its units; everything else in it is passed over.
+/// Reads the functions of a universal file and its units; other data sets are skipped.
 ///
 /// # Errors
-/// [`FrfUffError::Open`]; [`FrfUffError::Content`] for a file of another format that is known.
+/// [`FrfUffError::Open`] if the file cannot be read.
 pub fn contents(path: &Path) -> Result<Contents, FrfUffError> {
     let bytes = foreign::bytes(path, foreign::UNIVERSAL)
         .map_err(|source| FrfUffError::Open { path: path.into(), source })?;
     Ok(read_only(&bytes, &[58, 164]))
 }
 
-/// An FRF of a file with what its axes say.
+/// An FRF of a file with the information from its axes.
 struct Part<'c> {
     function: &'c Function,
     values: &'c [Complex<f64>],
     scale: Scale,
-    /// Which of the distinct axes its lines are on.
+    /// Index of its frequency axis among the distinct ones.
     axis: usize,
 }
 
-/// The same from what was read of a file.
+/// As [`read_frf_uff`], from contents that were read already.
 ///
 /// # Errors
-/// The reason in words.
+/// What is wrong, in words.
 pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<LabelledFrf, String> {
     let mut notes = left_out(contents);
     let mut real = 0;
@@ -145,7 +145,7 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
     let (quantity, sigma_per_s) = (first.scale.quantity, sigma(first.function)?);
     let lines = frequency_hz.len();
     let ((rows, row_of), (columns, column_of)) = (distinct(&outputs), distinct(&inputs));
-    // as many values as there are, or a matrix that is mostly holes
+    // bounds memory: the matrix must not be mostly missing pairs
     let (pairs, there) = (rows.len().saturating_mul(columns.len()), parts.len());
     let bytes = (pairs.saturating_mul(16).saturating_add(LINE)).saturating_mul(lines);
     if bytes > OF_HOLES.saturating_mul(there * lines * 16).saturating_add(MOST_OF_FEW) {
@@ -210,8 +210,8 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
     Ok(LabelledFrf { taken: words.join(", "), ..read })
 }
 
-/// The sign with which a value counts along the first label of its sensor or impact, which `known` keeps;
-/// none where the two name different axes.
+/// The sign of a value relative to the first label of its sensor or impact, which is stored in
+/// `known`; `None` where the two name different axes.
 fn side<'l>(known: &mut Option<&'l Label>, own: &'l Label) -> Option<f64> {
     let first = known.get_or_insert(own).direction;
     match (first, own.direction) {
@@ -222,18 +222,18 @@ fn side<'l>(known: &mut Option<&'l Label>, own: &'l Label) -> Option<f64> {
     }
 }
 
-/// Most units, and most frequency axes, of one file.
+/// Most units, and most distinct frequency axes, of one file.
 const MOST_WORDS: usize = 8;
 const MOST_AXES: usize = 64;
 
-/// Lines that several axes share, Hz, and the places of these lines in each axis.
+/// Lines that several axes share, Hz, and the indices of these lines in each axis.
 type CommonAxis = (Vec<f64>, Vec<Vec<usize>>);
 
-/// The lines that all of the distinct axes share, Hz, as the most precise of them has them; and for each
-/// axis the places of these lines in it. What is left out is noted.
+/// The lines that all distinct axes share, Hz, with the values of the most precise axis, and for
+/// each axis the indices of these lines. Lines left out are noted.
 ///
 /// # Errors
-/// An axis that is of another grid than the most precise one.
+/// An axis whose grid differs from that of the most precise one.
 fn common_axis(
     axes: &[(Places<'_>, usize)],
     notes: &mut Vec<String>,
@@ -281,17 +281,17 @@ fn common_axis(
     Ok((frequency_hz, places))
 }
 
-/// A matrix may take so many times the memory of its FRFs …
+/// A matrix may take this many times the memory of its FRFs …
 const OF_HOLES: usize = 2;
-/// … and of a few lines so much, bytes.
+/// … plus this, bytes, for FRFs of a few lines.
 const MOST_OF_FEW: usize = 16 << 20;
-/// Bytes of a line's matrix beside its values.
+/// Bytes that the matrix of a line takes in addition to its values.
 const LINE: usize = 64;
 
-/// Most faults of a file that are told one by one.
+/// Most faults of a file that are listed one by one.
 const MOST_TOLD: usize = 20;
 
-/// What could not be read, for people.
+/// Notes on what could not be read.
 pub(super) fn left_out(contents: &Contents) -> Vec<String> {
     let faults = &contents.faults;
     let mut told: Vec<String> =
@@ -308,7 +308,7 @@ pub(super) fn left_out(contents: &Contents) -> Vec<String> {
     told
 }
 
-/// Names in the order in which they appear first, and where each stands in it.
+/// The distinct names in the order of their first appearance, and the index of each.
 fn distinct(names: &[String]) -> (Vec<String>, HashMap<&str, usize>) {
     let (mut order, mut place) = (Vec::new(), HashMap::new());
     for name in names {
@@ -320,8 +320,8 @@ fn distinct(names: &[String]) -> (Vec<String>, HashMap<&str, usize>) {
     (order, place)
 }
 
-/// What a degree of freedom says. An entity may name its axis itself, as in `1+X`: the axis is then no
-/// part of the name.
+/// The label of a degree of freedom. An entity may end with its axis, as in `1+X`; the axis is then
+/// removed from the name.
 pub(super) fn label(dof: &Dof) -> Label {
     let entity = match dof.entity.trim() {
         "NONE" => "",
@@ -361,7 +361,7 @@ fn output_names(labels: &[Label]) -> Vec<String> {
     labels.iter().map(name).collect()
 }
 
-/// Names of inputs: an impact that has several axes is called as its entity.
+/// Names of inputs: an impact that has several axes is named by its entity.
 fn input_names(labels: &[Label]) -> Vec<String> {
     let mut axes: HashMap<&str, (i64, bool)> = HashMap::new();
     for label in labels {
@@ -376,7 +376,7 @@ fn input_names(labels: &[Label]) -> Vec<String> {
     labels.iter().map(name).collect()
 }
 
-/// The damping that text 4 tells, 1/s; 0 where it tells none.
+/// The damping in text 4, 1/s; 0 where there is none.
 fn sigma(f: &Function) -> Result<f64, String> {
     let words: Vec<&str> = f.id[3].split_whitespace().collect();
     match words[..] {
@@ -385,11 +385,11 @@ fn sigma(f: &Function) -> Result<f64, String> {
     }
 }
 
-/// The FRFs as functions. `input_directions` are the impacts' directions (±1, 2, 3; 0 unknown), one for each input. Outputs called
-/// `NAME:x` and so on become the sensor NAME with a direction.
+/// Converts FRFs to functions. `input_directions` holds the direction of each input (±1, 2, 3; 0
+/// unknown). Outputs named `NAME:x` and so on become the sensor NAME with a direction.
 ///
 /// # Errors
-/// The matrix contradicts itself, or a name is longer than the format's 10 characters (when written).
+/// None at present. A name longer than the format's 10 characters is an error of [`write_uff`].
 pub fn to_functions(frf: &Frf, input_directions: &[i64], encoding: Encoding) -> Result<Vec<DataSet>, String> {
     let (ordinate, label, unit) = match frf.quantity() {
         MotionQuantity::Displacement => (quantity::DISPLACEMENT, "Displacement", "m"),
@@ -437,7 +437,7 @@ pub fn to_functions(frf: &Frf, input_directions: &[i64], encoding: Encoding) -> 
     Ok(sets)
 }
 
-/// Sensor and direction of an output's name.
+/// Sensor and direction in the name of an output.
 fn split(name: &str) -> (&str, i64) {
     let axis = |axis: &str| (1..).zip(["x", "y", "z", "rx", "ry", "rz"]).find(|(_, a)| *a == axis);
     name.rsplit_once(':').and_then(|(sensor, a)| Some((sensor, axis(a)?.0))).unwrap_or((name, 0))
@@ -446,7 +446,7 @@ fn split(name: &str) -> (&str, i64) {
 /// Writes data sets to a file.
 ///
 /// # Errors
-/// What does not fit the format, or the disk's.
+/// The data sets do not fit the format, or the file cannot be written.
 pub fn write_uff(path: &Path, sets: &[DataSet]) -> Result<(), FrfUffError> {
     let content = |e: WriteError| FrfUffError::Content { path: path.into(), reason: e.to_string() };
     let bytes = super::uff::write(sets).map_err(content)?;
@@ -550,7 +550,7 @@ mod tests {
             milli("(mm/s)/N"),
             [vec![of_file(1e3)], milli("mm/s")].concat(),
             [vec![of_file(1e3)], milli("")].concat(),
-            // it is the data set before a function that counts for it
+            // the data set 164 that precedes a function applies to it
             [vec![of_file(1.0)], milli("")[..0].to_vec(), vec![of_file(1e3)], milli("")].concat(),
         ] {
             let back = read_back(&sets).expect("read");
@@ -580,7 +580,7 @@ mod tests {
         let back = read_back(&sets).expect("read");
         near(&back.frf, &frf());
         assert!(back.taken.contains("A1 along −z turned"), "{}", back.taken);
-        // told both ways within one file
+        // both signs within one file
         let sets = changed(|at, f| {
             if at == 1 || at == 3 {
                 f.response.direction = -f.response.direction;

@@ -1,4 +1,4 @@
-//! A geometry in any of the forms in which it may lie on a disk.
+//! Reads a geometry in any of its file formats.
 
 use super::positions::{PositionsError, read_positions};
 use crate::substructuring::Geometry;
@@ -7,52 +7,53 @@ use crate::{advice, foreign};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why there is no geometry.
+/// Why a geometry could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum GeometryFileError {
     /// The file cannot be read.
     #[error("{}: reading the geometry: {source}; {}", path.display(), advice::reading(source))]
     Read {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The cause.
         source: io::Error,
     },
-    /// It is no such TOML.
+    /// The TOML file is not a valid geometry.
     #[error(
         "{}, line {line}: {what}; a geometry has `a`, `b` and `ajb`, each with `channels` and `impacts`, and both virtual points \
          (docs/coming-from-pyfbs.md)", path.display()
     )]
     Toml {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// Where in it, from 1.
+        /// Line number, from 1.
         line: usize,
         /// What is wrong.
         what: String,
     },
-    /// Positions beyond any rig.
+    /// A position beyond the size of any rig.
     #[error(
         "{}: `{name}` stands at {coordinate} m, and no place may be further than {FARTHEST_M} m from the origin: positions are in m, not in mm",
         path.display()
     )]
     TooFar {
-        /// Which.
+        /// The file.
         path: PathBuf,
         /// The point.
         name: String,
         /// The coordinate, m.
         coordinate: f64,
     },
-    /// The workbook or its tables.
+    /// The workbook or its tables are invalid.
     #[error(transparent)]
     Positions(#[from] PositionsError),
 }
 
-/// The geometry of a workbook (.xlsx), a folder of its tables as .csv, or .toml, and what a reader must know about it.
+/// Reads a geometry from a workbook (.xlsx), a folder of its tables as .csv, or a .toml file; also
+/// returns warnings for the user.
 ///
 /// # Errors
-/// [`GeometryFileError`] naming the place.
+/// [`GeometryFileError`] naming the place in the file.
 pub fn read_geometry(path: &Path) -> Result<(Geometry, Vec<String>), GeometryFileError> {
     let (geometry, warnings) = of_any_size(path)?;
     match geometry.too_far() {
@@ -82,7 +83,7 @@ fn of_any_size(path: &Path) -> Result<(Geometry, Vec<String>), GeometryFileError
 mod tests {
     use super::*;
 
-    /// The test tables in a folder of their own, each text changed.
+    /// The test tables in a temporary folder, each text changed.
     fn changed(change: impl Fn(&str) -> String) -> tempfile::TempDir {
         let data = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/positions/csv");
         let dir = tempfile::tempdir().expect("a temporary folder");

@@ -1,39 +1,39 @@
-//! FRFs with what the labels of their file say besides: along which signed axis each response and each
-//! force counts, and in which units the values were.
+//! FRFs together with the labels of their file: the signed axes of each response and each force,
+//! and the units of the values.
 
 use super::direction::{Beside, axis_name, beside, turned_words, vector_name};
 use crate::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
 
-/// What a label says of an output or an input.
+/// The label of an output or an input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Label {
-    /// Its entity as it stands, which may name the axis too (`1+X`); empty where there is none.
+    /// The entity as written, which may include the axis (`1+X`); empty where there is none.
     pub entity: String,
-    /// The name of its sensor or impact without the axis.
+    /// The name of the sensor or impact without the axis.
     pub name: String,
-    /// ±1, 2, 3 along x, y, z; 0 where no axis is named.
+    /// ±1, 2, 3 along x, y, z; 0 where no axis is given.
     pub direction: i64,
 }
 
-/// FRFs as a file has them. Responses are along positive axes: what was along a negative one is turned.
-/// A value is per force along the impact's own direction, which its label has with a sign.
+/// FRFs read from a file. Responses are along positive axes: those along a negative axis had their
+/// sign changed. A value is per force along the impact's direction, whose sign the label gives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledFrf {
     /// The values in SI.
     pub frf: Frf,
-    /// One for each output.
+    /// Labels of the outputs.
     pub outputs: Vec<Label>,
-    /// One for each input.
+    /// Labels of the inputs.
     pub inputs: Vec<Label>,
-    /// What was read, in one line: `mobility in (mm/s)/N, A1 along −z turned`.
+    /// A one-line description of what was read: `mobility in (mm/s)/N, A1 along −z turned`.
     pub taken: String,
-    /// What was left out, is missing or is not sure.
+    /// What was left out, is missing or is uncertain.
     pub notes: Vec<String>,
 }
 
 impl LabelledFrf {
-    /// Of FRFs whose file says no directions.
+    /// FRFs of a file that gives no directions.
     pub fn unlabelled(frf: Frf, taken: String, notes: Vec<String>) -> Self {
         let labels = |names: &[String]| {
             let label = |name: &String| Label { name: name.clone(), ..Label::default() };
@@ -43,13 +43,13 @@ impl LabelledFrf {
         LabelledFrf { frf, outputs, inputs, taken, notes }
     }
 
-    /// The same with other FRFs of the same outputs and inputs.
+    /// Replaces the FRFs; outputs and inputs stay.
     #[must_use]
     pub fn with(self, frf: Frf) -> Self {
         LabelledFrf { frf, ..self }
     }
 
-    /// The same with responses along positive axes, and what was turned for it.
+    /// Turns responses to positive axes; also returns which ones were turned.
     pub(super) fn turned_to_axes(mut self) -> (Self, Vec<(String, i64)>) {
         let is_turned: Vec<bool> =
             self.outputs.iter().map(|label| (-3..0).contains(&label.direction)).collect();
@@ -62,11 +62,11 @@ impl LabelledFrf {
         (LabelledFrf { frf: negated(self.frf, &is_turned, &none), ..self }, turned)
     }
 
-    /// The FRFs along the directions that these points have, under their names; and what was turned or
-    /// must be known. Outputs and inputs that no point has stay as they are.
+    /// The FRFs along the directions and under the names of these points, with notes on what was
+    /// turned or is uncertain. Outputs and inputs without a point stay as they are.
     ///
     /// # Errors
-    /// A label and its point have different axes: both are named.
+    /// A label and its point have different axes; the message names both.
     pub fn along(self, points: &Configuration) -> Result<(Frf, Vec<String>), String> {
         let (mut told, mut turned) = (Vec::new(), Vec::new());
         let (channels, impacts) = (points.output_names(), points.input_names());
@@ -75,7 +75,7 @@ impl LabelledFrf {
         for (row, label) in self.outputs.iter().enumerate() {
             let Some(at) = channel_of(&outputs[row], label, &channels, &points.channels) else { continue };
             outputs[row].clone_from(&channels[at]);
-            // a channel that is named after its axis may be along any direction
+            // a channel that is named after its axis may have any direction
             let is_named = axis_name(label.direction).is_some_and(|axis| {
                 channels[at].ends_with(&format!(":{}", axis.trim_start_matches(['+', '−'])))
             });
@@ -98,7 +98,7 @@ impl LabelledFrf {
     }
 }
 
-/// FRFs with the sign of these outputs and inputs changed.
+/// Changes the sign of these outputs and inputs.
 fn negated(frf: Frf, outputs: &[bool], inputs: &[bool]) -> Frf {
     if !outputs.contains(&true) && !inputs.contains(&true) {
         return frf;
@@ -114,8 +114,8 @@ fn negated(frf: Frf, outputs: &[bool], inputs: &[bool]) -> Frf {
     })
 }
 
-/// Which channel an output is: by its name, by the entity as it stands, by name and axis, or as the only
-/// channel of its sensor along the label's axis.
+/// Finds the channel of an output: by its name, by the entity as written, by name and axis, or as
+/// the only channel of its sensor along the label's axis.
 fn channel_of(output: &str, label: &Label, names: &[String], channels: &[Point]) -> Option<usize> {
     let axis = axis_name(label.direction).map(|axis| axis.trim_start_matches(['+', '−']).to_owned());
     let with_axis = axis.map(|axis| format!("{}:{axis}", label.name));
@@ -136,7 +136,7 @@ fn channel_of(output: &str, label: &Label, names: &[String], channels: &[Point])
         })
 }
 
-/// Whether the values of a label change their sign for the direction of its point.
+/// Whether the values of a label change their sign to match the direction of its point.
 fn look(
     label: &Label,
     point: &Point,
@@ -191,7 +191,7 @@ mod tests {
         Label { entity: entity.into(), name: name.into(), direction }
     }
 
-    /// A value of 1 + 0.5 i from every input to every output.
+    /// A value of 1 + 0.5 i for every pair of input and output.
     fn ones(outputs: &[(&str, Label)], inputs: &[(&str, Label)]) -> LabelledFrf {
         let names =
             |all: &[(&str, Label)]| all.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>();

@@ -1,11 +1,13 @@
-//! Formats of other programs, in and out: the only room between analysis and foreign files.
+//! Reads and writes formats of other programs; the only module between the analysis and such files.
 //!
-//! [`npz`] and [`npz_output`] are the array layer; [`frf_npz`] and [`record_npz`] say which arrays make an
-//! FRF matrix, impact records or a hysteresis record; [`positions`] reads the pyFBS workbook, as xlsx or
-//! as a folder of csv tables. [`uff`] is the universal file; [`frf_uff`] and [`record_uff`] say which of
-//! its functions make FRFs or records, [`frf_file`] takes either form. [`units`] is the one table of
-//! units, [`direction`] the one rule for signed directions; [`labelled_frf`] and [`record_file`] hold
-//! what was read with both. A [`typed_table::Table`] becomes text with commas, or, with the feature
+//! [`npz`] and [`npz_output`] read and write arrays; [`frf_npz`] and [`record_npz`] define which
+//! arrays make an FRF matrix, impact records or a hysteresis record. [`positions`] reads the pyFBS
+//! workbook, as xlsx or as a folder of csv tables. [`uff`] is the universal file; [`frf_uff`] and
+//! [`record_uff`] define which of its functions make FRFs or records; [`frf_file`] accepts either
+//! form. [`units`] holds the only table of units, [`direction`] the only rule for signed
+//! directions; [`labelled_frf`] and [`record_file`] hold what was read with both. A
+//! [`typed_table::Table`] is written as comma-separated text or, with the feature `parquet`, as
+//! typed columns.
 //! `parquet`, columns for engines.
 
 #[cfg(test)]

@@ -1,24 +1,26 @@
-//! The header of one array: `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }`, and nothing else.
+//! Parses the header of one array: `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }`,
+//! and nothing else.
 //!
-//! A reader of Python expressions could do more, and would: brackets in brackets, of which each doubles its work. Every tool writes these
-//! three keys with values that are no deeper than a row of numbers, so no more is understood here.
+//! A general parser of Python expressions would also accept nested brackets, each level of which
+//! may double its work. All tools write these three keys with values no deeper than a row of
+//! numbers, so nothing else is accepted.
 
 use std::io::Read;
 
-/// Most bytes of a header; numpy's own bound for what it does not trust is 10 000.
+/// Largest header, bytes; numpy's bound for untrusted files is 10 000.
 const MOST_BYTES: usize = 1 << 16;
 
-/// Most axes that an array may have, as in numpy.
+/// Most axes of an array, as in numpy.
 const MOST_AXES: usize = 64;
 
-/// What an array holds, and how.
+/// Type, byte order, memory order and shape of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Header {
-    /// The type's letter: `f`, `c`, `i`, `u`, `U`, `S` are read.
+    /// The type letter: `f`, `c`, `i`, `u`, `U`, `S` are supported.
     pub kind: char,
     /// Bytes of an element.
     pub width: usize,
-    /// Whether its high byte comes first.
+    /// Whether the values are big-endian.
     pub big: bool,
     /// Whether the first index runs fastest.
     pub fortran: bool,
@@ -27,10 +29,10 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads it; `from` then stands at the values.
+    /// Reads the header; `from` is then at the first value.
     ///
     /// # Errors
-    /// What is wrong, as the end of a sentence that begins with the array.
+    /// What is wrong, as the end of a sentence whose subject is the array.
     pub fn read(from: &mut impl Read) -> Result<Self, String> {
         let damaged = |what: &str| format!("is damaged ({what})");
         let mut exactly = |count: usize| {
@@ -53,13 +55,13 @@ impl Header {
         Words { rest: &text }.header()
     }
 
-    /// Number of elements, where it can be counted at all.
+    /// Number of elements; `None` if it overflows.
     pub fn elements(&self) -> Option<usize> {
         self.shape.iter().try_fold(1usize, |product, length| product.checked_mul(*length))
     }
 }
 
-/// What is left of a header.
+/// The rest of a header while it is parsed.
 struct Words<'t> {
     rest: &'t str,
 }
@@ -93,7 +95,7 @@ impl<'t> Words<'t> {
         else {
             return Err(format!("has elements of type `{}`", descr.escape_debug()));
         };
-        // numpy counts the characters of a text, not its bytes
+        // numpy gives the width of a text in characters, not in bytes
         let width = if letter == 'U' { width.saturating_mul(4) } else { width };
         Ok(Header { kind: letter, width, big: descr.starts_with('>'), fortran, shape })
     }
@@ -142,7 +144,7 @@ impl<'t> Words<'t> {
             let digits = self.rest.bytes().take_while(u8::is_ascii_digit).count();
             let (number, rest) = self.rest.split_at(digits);
             let Ok(number) = number.parse() else { return Err(self.wrong("a length of an axis is missing")) };
-            // Python 2 wrote its long numbers with an L
+            // Python 2 wrote long integers with an L
             self.rest = rest.strip_prefix('L').unwrap_or(rest).trim_start();
             numbers.push(number);
             if numbers.len() > MOST_AXES {

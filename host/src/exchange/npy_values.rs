@@ -1,15 +1,17 @@
-//! The values of one array: numbers of any width and either byte order, texts, and the order of their axes.
+//! The values of one array: numbers of any width and either byte order, texts, and the order of
+//! their axes.
 
 use num_complex::Complex;
 
 use super::npy_header::Header;
 
-/// Makes a number of an element's bytes; the second says whether the high byte comes first.
+/// Converts the bytes of an element to a number; the second argument is whether they are
+/// big-endian.
 pub(super) type FromBytes = fn(&[u8], bool) -> Complex<f64>;
 
-/// How a number of this type is read from its bytes.
+/// The function that reads a number of this type from its bytes; `None` for other types.
 pub(super) fn number_of(header: &Header) -> Option<FromBytes> {
-    /// The bytes of an element, low byte first; their number is the type's.
+    /// The bytes of an element in little-endian order.
     fn low_first<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
         let mut word = [0; N];
         word.copy_from_slice(bytes);
@@ -48,7 +50,7 @@ pub(super) fn number_of(header: &Header) -> Option<FromBytes> {
     })
 }
 
-/// The text of an element; what fills it up behind the text is left out.
+/// The text of an element without its zero padding.
 pub(super) fn letters(bytes: &[u8], header: &Header) -> Result<String, String> {
     let damaged = || "is damaged (its text is none)".to_owned();
     if header.kind != 'U' {
@@ -64,7 +66,7 @@ pub(super) fn letters(bytes: &[u8], header: &Header) -> Result<String, String> {
     Ok(text)
 }
 
-/// Values as stored, rearranged so that the last index runs fastest.
+/// Rearranges stored values so that the last index runs fastest.
 pub(super) fn in_c_order<T: Clone>(values: Vec<T>, header: &Header) -> Vec<T> {
     let shape = &header.shape;
     if !header.fortran || shape.len() < 2 {
@@ -98,9 +100,9 @@ mod tests {
         let turned = in_c_order(vec![1, 4, 2, 5, 3, 6], &of(&[2, 3]));
         assert_eq!(turned, [1, 2, 3, 4, 5, 6]);
         let three = in_c_order((0..24).collect(), &of(&[2, 3, 4]));
-        // (1, 2, 3) stands at 1 + 2·2 + 6·3 in Fortran order and last in C order
+        // (1, 2, 3) is at 1 + 2·2 + 6·3 in Fortran order and last in C order
         assert_eq!(three[23], 23);
-        // (0, 1, 2) at 0 + 2·1 + 6·2
+        // (0, 1, 2) is at 0 + 2·1 + 6·2
         assert_eq!(three[4 + 2], 14);
     }
 

@@ -1,8 +1,10 @@
 //! Arrays in npz archives: the layer that the FRF and record files share.
 //!
-//! Reads real, complex and text arrays of any numpy width, either byte order and either memory order; always
-//! gives C order and the widest type. Every error names the file, the array and what was expected of it. Values are read as a stream, and
-//! all that is read of one file may take so much memory as its size allows: a few bytes may say that they are a billion zeros.
+//! Reads real, complex and text arrays of any numpy width, in either byte order and either memory
+//! order; always returns C order and the widest type. Every error names the file, the array and
+//! what was expected of it. Values are read as a stream. The memory for all that is read of one
+//! file is bounded by the file's size, because a few compressed bytes may expand to a billion
+//! zeros.
 
 use super::archive;
 use super::npy_header::Header;
@@ -31,18 +33,18 @@ pub struct NpzFile {
     path: PathBuf,
     archive: ZipArchive<BufReader<File>>,
     size: u64,
-    /// Bytes of memory that its arrays may still take.
+    /// Bytes of memory that arrays of this file may still take.
     left: u64,
 }
 
-/// Bytes of a name's own place in memory, beside its letters.
+/// Bytes that a string takes in memory in addition to its characters.
 const NAME: u64 = 56;
 
-/// Values are read in pieces of so many bytes.
+/// Bytes of the pieces in which values are read.
 const PIECE: usize = 1 << 16;
 
 impl NpzFile {
-    /// Opens the archive; arrays are read when asked for.
+    /// Opens the archive; arrays are read on demand.
     ///
     /// # Errors
     /// [`NpzError::Open`].
@@ -52,10 +54,10 @@ impl NpzFile {
         Ok(NpzFile { path: path.into(), archive, size, left: foreign::memory_for(size) })
     }
 
-    /// Counts memory that `array` is about to take, in the form in which it is handed on.
+    /// Counts the memory that `array` is about to take in the form in which it is returned.
     ///
     /// # Errors
-    /// [`NpzError::Unexpected`] when a file of this size may not take it.
+    /// [`NpzError::Unexpected`] when this exceeds the limit for a file of this size.
     pub fn charge(&mut self, array: &str, count: usize, each: u64, expected: &str) -> Result<(), NpzError> {
         let bytes = (count as u64).saturating_mul(each);
         if let Some(left) = self.left.checked_sub(bytes) {
@@ -72,7 +74,7 @@ impl NpzFile {
         Err(self.unexpected(array, &found, expected))
     }
 
-    /// Whether there is an array of this name.
+    /// Whether the file has an array of this name.
     pub fn has(&self, array: &str) -> bool {
         self.archive.index_for_name(&file_name_from_array_name(array)).is_some()
     }
@@ -100,10 +102,10 @@ impl NpzFile {
         if complex { Err(self.unexpected(array, "is complex", expected)) } else { Ok(found) }
     }
 
-    /// One real number: a scalar array, or one of length one.
+    /// Reads one real number: a scalar array, or one of length one.
     ///
     /// # Errors
-    /// As [`NpzFile::real`]; or it has several values or none, or is not finite.
+    /// As [`NpzFile::real`]; also when it has several values or none, or is not finite.
     pub fn number(&mut self, array: &str, expected: &str) -> Result<f64, NpzError> {
         let real = self.real(array, expected)?;
         match real.values[..] {
@@ -121,7 +123,7 @@ impl NpzFile {
         self.numbers(array, expected, 16, |value| value)
     }
 
-    /// Numbers as `take` wants them, each in so many bytes.
+    /// Reads numbers and converts them with `take`; each result takes `each` bytes.
     fn numbers<T: Clone>(
         &mut self,
         array: &str,
@@ -145,7 +147,7 @@ impl NpzFile {
     /// A text array (unicode or bytes).
     ///
     /// # Errors
-    /// When it is missing, no text, or damaged.
+    /// When it is missing, not text, or damaged.
     pub fn text(&mut self, array: &str, expected: &str) -> Result<Array<String>, NpzError> {
         let (header, count) = self.header(array, expected)?;
         if !matches!(header.kind, 'U' | 'S' | 'a') {
@@ -160,10 +162,10 @@ impl NpzFile {
         Ok(Array { values: in_c_order(values, &header), shape: header.shape })
     }
 
-    /// One word.
+    /// Reads a text array with one value.
     ///
     /// # Errors
-    /// As [`NpzFile::text`], or there are several.
+    /// As [`NpzFile::text`]; also when it has several values or none.
     pub fn word(&mut self, array: &str, expected: &str) -> Result<String, NpzError> {
         let text = self.text(array, expected)?;
         match &text.values[..] {
@@ -172,10 +174,10 @@ impl NpzFile {
         }
     }
 
-    /// The unit that a person states, or else the one that the array names; none where neither says any.
+    /// The unit stated by the user, else the one in the array; `None` where neither is given.
     ///
     /// # Errors
-    /// It is not known, or of something else.
+    /// The unit is unknown or of another dimension.
     pub fn unit(
         &mut self,
         array: &str,
@@ -200,11 +202,11 @@ impl NpzFile {
         })
     }
 
-    /// Refuses arrays that are called after a unit, but not as one of `known`: they would be passed over,
-    /// and the values taken for SI.
+    /// Refuses arrays whose names contain `unit` but are not in `known`: they would be ignored and
+    /// the values taken as SI.
     ///
     /// # Errors
-    /// [`NpzError::Content`] with the names.
+    /// [`NpzError::Content`] with the names of these arrays.
     pub fn refuse_other_units(&self, known: &[&str]) -> Result<(), NpzError> {
         let mut others: Vec<String> = self
             .archive
@@ -225,7 +227,7 @@ impl NpzFile {
         )))
     }
 
-    /// An [`NpzError::Unexpected`] of this file.
+    /// An [`NpzError::Unexpected`] for this file.
     pub fn unexpected(&self, array: &str, found: &str, expected: &str) -> NpzError {
         NpzError::Unexpected {
             path: self.path.clone(),
@@ -235,7 +237,7 @@ impl NpzFile {
         }
     }
 
-    /// The member that an array stands in.
+    /// Opens the archive member of an array.
     fn member(&mut self, array: &str, expected: &str) -> Result<impl Read + '_, NpzError> {
         let at = self.archive.index_for_name(&file_name_from_array_name(array));
         let Some(at) = at else {
@@ -263,8 +265,8 @@ impl NpzFile {
         })
     }
 
-    /// What an array says of itself, and how many elements it has. One that promises more bytes than the archive says to hold is refused
-    /// before anything of its size is allocated.
+    /// Reads an array's header and its number of elements. A header that claims more bytes than the
+    /// archive lists for the member is refused before anything of that size is allocated.
     fn header(&mut self, array: &str, expected: &str) -> Result<(Header, usize), NpzError> {
         let header = Header::read(&mut self.member(array, expected)?);
         let header = header.map_err(|found| self.unexpected(array, &found, expected))?;
@@ -284,7 +286,7 @@ impl NpzFile {
         }
     }
 
-    /// Hands every element's bytes on, in the order of the file.
+    /// Passes the bytes of every element to `take`, in file order.
     fn elements(
         &mut self,
         array: &str,
@@ -309,7 +311,7 @@ impl NpzFile {
                 piece.chunks_exact(header.width).try_for_each(&mut take)?;
                 left -= piece.len() / header.width;
             }
-            // the archive's own sum is looked at where the member ends
+            // the archive checks its checksum when the member has been read to its end
             from.read(&mut [0]).map(|_| ()).map_err(damaged)
         };
         let read = read();
@@ -318,7 +320,7 @@ impl NpzFile {
     }
 }
 
-/// Most arrays whose names a message lists.
+/// Most arrays that an error message lists.
 const MOST_NAMED: usize = 40;
 
 fn of_type(header: &Header) -> String {
@@ -350,7 +352,7 @@ mod tests {
         assert!(file.real("c", "numbers").is_err());
     }
 
-    /// An archive of one array `force` with this header and so many bytes of zero behind it.
+    /// An archive with one array `force`, this header, and `zeros` zero bytes as values.
     fn force(descr: &str, shape: &str, zeros: usize) -> tempfile::NamedTempFile {
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
         let mut zip = zip::ZipWriter::new(file.reopen().expect("the same file"));
@@ -369,7 +371,7 @@ mod tests {
         let file = force("<f8", "(4000000000, 1000000)", 0);
         let error = NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect_err("bomb");
         assert!(error.to_string().contains("`force`"), "{error}");
-        // elements without a byte cost the file nothing, and memory each
+        // elements of zero bytes take no space in the file, but each takes memory
         let file = force("|S0", "(1000000000000,)", 0);
         let error = NpzFile::open(file.path()).expect("a zip").text("force", "names").expect_err("bomb");
         assert!(error.to_string().contains("`force` would take"), "{error}");
@@ -383,7 +385,7 @@ mod tests {
         let error = NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect_err("bomb");
         assert!(error.to_string().contains("would take 400 MB"), "{error} of {size} bytes");
         assert!(begun.elapsed().as_secs() < 2);
-        // what a disk's sector of zeros makes smaller is read
+        // zeros that compress moderately are read
         let file = force("<f4", "(2, 100000)", 800_000);
         let read = NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect("zeros");
         assert_eq!((read.shape, read.values.len()), (vec![2, 100_000], 200_000));

@@ -1,4 +1,4 @@
-//! Why an npz file cannot be read or written, in words.
+//! Errors of reading and writing npz files.
 
 use crate::advice;
 use std::io;
@@ -7,12 +7,12 @@ use std::path::PathBuf;
 /// Why an npz file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum NpzError {
-    /// The file is not there, not readable, or no npz archive.
+    /// The file does not exist, cannot be read or is not an npz archive.
     #[error("{}: cannot be opened as npz: {source}; {}", path.display(), advice::reading(source))]
     Open {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
     /// An array is missing.
@@ -24,22 +24,22 @@ pub enum NpzError {
         array: String,
         /// What it should hold.
         expected: String,
-        /// Names of the arrays that are there.
+        /// Names of the arrays in the file.
         available: String,
     },
-    /// An array is not what it should be.
+    /// An array does not have the expected type, shape or value.
     #[error("{}: array `{array}` {found}; expected {expected}", path.display())]
     Unexpected {
         /// The file.
         path: PathBuf,
         /// The array.
         array: String,
-        /// What it is.
+        /// What was found.
         found: String,
-        /// What it should be.
+        /// What was expected.
         expected: String,
     },
-    /// Arrays are well formed, but what they say is not an FRF or a record.
+    /// The arrays are well formed, but do not make an FRF or a record.
     #[error("{}: {reason}", path.display())]
     Content {
         /// The file.
@@ -52,7 +52,7 @@ pub enum NpzError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
 }

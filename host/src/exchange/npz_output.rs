@@ -1,4 +1,4 @@
-//! Arrays into an npz archive: float64, complex128 and unicode, in C order.
+//! Writes arrays into an npz archive: float64, complex128 and unicode, in C order.
 
 use super::npz_error::NpzError;
 use npyz::npz::file_name_from_array_name;
@@ -19,7 +19,7 @@ pub struct NpzOutput {
 }
 
 impl NpzOutput {
-    /// Creates or replaces the file.
+    /// Creates the file or replaces an existing one.
     ///
     /// # Errors
     /// [`NpzError::Write`].
@@ -29,7 +29,8 @@ impl NpzOutput {
         Ok(NpzOutput { path: path.into(), archive, packing: CompressionMethod::Deflated })
     }
 
-    /// As numpy's `savez` writes it, for numbers that deflating would hardly make smaller.
+    /// Stores arrays without compression, as numpy's `savez` does; for numbers that hardly
+    /// compress.
     #[must_use]
     pub fn unpacked(self) -> Self {
         NpzOutput { packing: CompressionMethod::Stored, ..self }
@@ -66,7 +67,7 @@ impl NpzOutput {
     /// # Errors
     /// [`NpzError::Write`].
     pub fn text(&mut self, name: &str, shape: &[usize], values: &[String]) -> Result<(), NpzError> {
-        // numpy has no text of width zero
+        // numpy has no text type of width zero
         let width = values.iter().map(|v| v.chars().count()).max().unwrap_or(0).max(1);
         self.array(name, shape, &format!("<U{width}"), values.iter().cloned())
     }
@@ -79,11 +80,12 @@ impl NpzOutput {
         values: impl Iterator<Item = T>,
     ) -> Result<(), NpzError> {
         let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
-        // A fixed date keeps files of the same content identical.
+        // a fixed date keeps files of the same content identical
         let options = SimpleFileOptions::default()
             .last_modified_time(zip::DateTime::default())
             .compression_method(self.packing)
-            // records are the bulk: the usual effort takes two and a half times as long for half the size
+            // records are the bulk of the data: the default level takes 2.5 times as long for half
+            // the size
             .compression_level((self.packing == CompressionMethod::Deflated).then_some(1))
             .large_file(shape.iter().product::<u64>() > 100_000_000);
         let dtype = DType::new_scalar(kind.parse().expect("type strings above are numpy's own"));
@@ -91,7 +93,7 @@ impl NpzOutput {
         let written = archive.start_file(file_name_from_array_name(name), options).map_err(io::Error::from);
         let written = written.and_then(|()| {
             let array = WriteOptions::<T>::new().dtype(dtype).shape(&shape);
-            // the compressor works on what it is handed at once, however little that is
+            // buffered, because the compressor processes each write separately, however small
             let mut gathered = BufWriter::with_capacity(1 << 16, archive);
             let mut array = array.writer(&mut gathered).begin_nd()?;
             array.extend(values)?;

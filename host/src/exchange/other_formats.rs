@@ -1,26 +1,27 @@
-//! Files of other programs that are not read here, known by their first bytes, and how Python brings
-//! each of them into an npz.
+//! Recognises files of other programs that are not read here by their first bytes, and shows Python
+//! lines that convert each of them to npz.
 
 use crate::foreign;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Bytes of a file that are looked at: HDF5 may begin behind a block of 512 bytes that MATLAB writes.
+/// Number of bytes examined: HDF5 may begin after a block of 512 bytes that MATLAB writes.
 const LOOKED_AT: u64 = 1024;
 
-/// What an npz is made for.
+/// What the file is needed for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Contents {
     /// FRFs.
     Frfs,
     /// Impact records.
     Records,
-    /// A loop.
+    /// A hysteresis loop.
     Loop,
 }
 
 impl Contents {
-    /// Arguments of `numpy.savez` after the file's name, with `of` for what reads an array by its name.
+    /// Arguments of `numpy.savez` after the file name; `of` returns the expression that reads an
+    /// array by its name.
     fn arrays(self, of: &dyn Fn(&str) -> String) -> String {
         let list: &[(&str, &str)] = match self {
             Contents::Frfs => &[("frequency", "f"), ("frf", "H")],
@@ -37,7 +38,7 @@ impl Contents {
     }
 }
 
-/// A format that is known.
+/// A known format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Format {
     Matlab5,
@@ -94,13 +95,14 @@ impl Format {
         }
     }
 
-    /// The line of Python that opens it as `m`, and what reads an array of `m` by its name.
+    /// The line of Python that opens the file as `m`, and the expression that reads an array of `m`
+    /// by its name.
     fn python(self, file: &str) -> Option<PythonLines> {
         Some(match self {
             Format::Matlab5 => (format!("import numpy, scipy.io; m = scipy.io.loadmat({file})"), |name| {
                 format!("m[\"{name}\"]")
             }),
-            // MATLAB writes its arrays with the axes the other way round
+            // MATLAB stores arrays with the axes reversed
             Format::Matlab73 => {
                 (format!("import numpy, h5py; m = h5py.File({file})"), |name| format!("m[\"{name}\"][()].T"))
             }
@@ -148,8 +150,8 @@ fn is_universal(first: &[u8]) -> bool {
     next() == Some(b"-1") && next().is_some_and(|line| line.first().is_some_and(u8::is_ascii_digit))
 }
 
-/// What is said of a file whose first bytes are these, where it is of a format that is not read as
-/// `wanted`; none of any other file.
+/// The message for a file of a known format that is not read as `wanted`, from its first bytes;
+/// `None` for any other file.
 fn said(path: &Path, first: &[u8], wanted: Contents) -> Option<String> {
     let format = Format::of(first)?;
     let name = format.name();
@@ -172,10 +174,11 @@ fn said(path: &Path, first: &[u8], wanted: Contents) -> Option<String> {
     }
 }
 
-/// What is said of a file of a known format that is not read as `wanted`; none of any other file.
+/// The message for a file of a known format that is not read as `wanted`; `None` for any other
+/// file.
 ///
 /// # Errors
-/// The operating system's.
+/// An error of the operating system.
 pub(super) fn not_read_here(path: &Path, wanted: Contents) -> io::Result<Option<String>> {
     let mut first = Vec::new();
     foreign::open(path).and_then(|(file, _)| file.take(LOOKED_AT).read_to_end(&mut first))?;

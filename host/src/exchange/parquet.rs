@@ -1,6 +1,7 @@
-//! Columns for engines (DuckDB, Polars, Spark): Parquet files, compressed with zstd.
+//! Writes Parquet files, compressed with zstd, for query engines (DuckDB, Polars, Spark).
 //!
-//! A file has its name only when it is whole. The same content gives the same bytes, with the same version of jointrig.
+//! A file gets its final name only when it is complete. The same content gives the same bytes with
+//! the same version of jointrig.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -21,29 +22,29 @@ use sha2::{Digest, Sha256};
 use super::typed_table::{Kind, Table, Value};
 use crate::advice;
 
-/// Level of compression: 9 gains nothing on hits, and takes three times as long.
+/// Compression level: 9 makes records of hits no smaller and takes three times as long.
 const ZSTD: i32 = 3;
 
-/// Rows of a table that are written together.
+/// Rows of a table that are written as one group.
 const ROWS_AT_ONCE: usize = 65_536;
 
-/// A Parquet file that cannot be written.
+/// Why a Parquet file could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ParquetFileError {
-    /// What the operating system said.
+    /// An error of the operating system.
     #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// What the library said.
+    /// An error of the Parquet library.
     #[error("{}: cannot be written as Parquet: {what}; report it with the campaign file", path.display())]
     Library {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         what: String,
     },
 }
@@ -51,19 +52,19 @@ pub enum ParquetFileError {
 /// How a column is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stored {
-    /// Codes of a converter: 16 bits, differences packed.
+    /// Converter codes: 16 bits, delta packed.
     Code,
-    /// A rising index: 32 bits, differences packed.
+    /// An increasing index: 32 bits, delta packed.
     Index,
-    /// Numbers that repeat: 64 bits, in a dictionary.
+    /// Repeating numbers: 64 bits, with a dictionary.
     Id,
-    /// SI values: 32 bits, bytes of one place together.
+    /// SI values: 32 bits, split into byte streams.
     Single,
-    /// Of a table, where any value may be missing.
+    /// A column of a table, in which any value may be missing.
     Of(Kind),
 }
 
-/// Values of one column in a group of rows.
+/// Values of one column in a row group.
 #[derive(Debug, Clone)]
 pub enum Values {
     /// For [`Stored::Code`] and [`Stored::Index`].
@@ -72,26 +73,26 @@ pub enum Values {
     Id(Vec<i64>),
     /// For [`Stored::Single`].
     Single(Vec<f32>),
-    /// For [`Stored::Of`]: whole numbers, and times in microseconds since 1970.
+    /// For [`Stored::Of`]: integers, and times in microseconds since 1970.
     MaybeWhole(Vec<Option<i64>>),
-    /// For [`Stored::Of`].
+    /// For [`Stored::Of`]: real numbers.
     MaybeReal(Vec<Option<f64>>),
-    /// For [`Stored::Of`].
+    /// For [`Stored::Of`]: text.
     MaybeText(Vec<Option<String>>),
 }
 
-/// What became of a file.
+/// Size and checksum of a file that was written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Bytes.
+    /// Size in bytes.
     pub bytes: u64,
-    /// SHA-256 of them, hexadecimal.
+    /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
 }
 
-/// A file that is being written; it vanishes when it is not finished.
+/// A file being written; it is removed if it is not finished.
 pub struct ParquetFile {
     path: PathBuf,
     beside: Beside,
@@ -99,18 +100,18 @@ pub struct ParquetFile {
     rows: u64,
 }
 
-/// The name of a file until it is whole. Nobody shall find what has it afterwards.
+/// The temporary name of an unfinished file. Dropping it removes the file.
 struct Beside(PathBuf);
 
 impl Drop for Beside {
     fn drop(&mut self) {
-        // a whole one has its own name by now
+        // a complete file has been renamed by now, so that nothing is removed
         let _ = std::fs::remove_file(&self.0);
     }
 }
 
 impl ParquetFile {
-    /// Begins a file with these columns, and words that explain it.
+    /// Creates a file with these columns and notes that describe it.
     ///
     /// # Errors
     /// [`ParquetFileError`].
@@ -130,7 +131,7 @@ impl ParquetFile {
         Ok(Self { path: path.into(), beside, writer, rows: 0 })
     }
 
-    /// Adds a group of rows: values of each column, in order.
+    /// Adds a row group: the values of each column, in order.
     ///
     /// # Errors
     /// [`ParquetFileError`].
@@ -139,7 +140,7 @@ impl ParquetFile {
         Ok(())
     }
 
-    /// Gives it its name.
+    /// Completes the file and gives it its final name.
     ///
     /// # Errors
     /// [`ParquetFileError`].
@@ -193,7 +194,7 @@ pub fn write_table(
     file.finish()
 }
 
-/// A column of a table; none where a value is of another kind.
+/// The values of a table's column; `None` where a value is of another kind.
 fn values<'a>(kind: Kind, of: impl Iterator<Item = &'a Value>) -> Option<Values> {
     Some(match kind {
         Kind::Whole => Values::MaybeWhole(column(of, |value| match value {
@@ -216,7 +217,7 @@ fn values<'a>(kind: Kind, of: impl Iterator<Item = &'a Value>) -> Option<Values>
     })
 }
 
-/// Each value as `known` takes it; a missing one is none in any column.
+/// Converts each value with `known`; a missing value is null in any column.
 fn column<'a, T>(
     of: impl Iterator<Item = &'a Value>,
     known: impl Fn(&Value) -> Option<Option<T>>,
@@ -269,7 +270,7 @@ fn properties(columns: &[(&str, Stored)], notes: &[(&str, String)]) -> WriterPro
     properties.build()
 }
 
-/// Writes a group of rows; how many there are.
+/// Writes a row group; returns its number of rows.
 fn group(writer: &mut SerializedFileWriter<Summed>, columns: &[Values]) -> Result<u64, ParquetError> {
     let mut group = writer.next_row_group()?;
     for values in columns {
@@ -303,18 +304,18 @@ fn group(writer: &mut SerializedFileWriter<Summed>, columns: &[Values]) -> Resul
 
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
-        // a String takes any text
+        // writing to a String cannot fail
         let _ = write!(text, "{byte:02x}");
         text
     })
 }
 
-/// 1 where there is a value.
+/// Definition levels: 1 where there is a value, 0 where it is missing.
 fn levels<T>(all: &[Option<T>]) -> Vec<i16> {
     all.iter().map(|value| i16::from(value.is_some())).collect()
 }
 
-/// A file whose bytes are added up on their way.
+/// A file whose SHA-256 is computed while it is written.
 struct Summed {
     file: BufWriter<File>,
     sum: Sha256,

@@ -1,7 +1,8 @@
 //! Geometry tables: the pyFBS workbook (xlsx), or the same tables as csv files in one folder.
 //!
-//! Eight sheets (`Channels_A`, `Impacts_A`, …, `VP_Channels`, `VP_RefChannels`), columns found by their heading, in metres.
-//! Every error names sheet, row and column; the row is the one a spreadsheet program shows.
+//! Eight sheets (`Channels_A`, `Impacts_A`, …, `VP_Channels`, `VP_RefChannels`) whose columns are
+//! found by their headings; positions are in metres. Every error names sheet, row and column; the
+//! row is numbered as in a spreadsheet program.
 
 use super::tables::{Cell, Tables, csv_tables, workbook_tables};
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
@@ -14,9 +15,9 @@ pub enum PositionsError {
     /// The workbook or folder cannot be opened.
     #[error("{}: cannot be opened as geometry ({reason}): give the .xlsx workbook or the folder of its .csv tables", path.display())]
     Open {
-        /// What was given.
+        /// The path given.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         reason: String,
     },
     /// A sheet is missing.
@@ -26,7 +27,7 @@ pub enum PositionsError {
         path: PathBuf,
         /// The sheet.
         sheet: String,
-        /// The sheets that are there.
+        /// The sheets that exist.
         available: String,
     },
     /// A heading is missing.
@@ -46,14 +47,14 @@ pub enum PositionsError {
         path: PathBuf,
         /// The sheet.
         sheet: String,
-        /// The row as a spreadsheet counts: the headings are row 1.
+        /// The row number in the spreadsheet: the headings are row 1.
         row: usize,
         /// The column.
         column: String,
-        /// What is wrong and what is wanted.
+        /// What is wrong and what is needed.
         reason: String,
     },
-    /// The virtual points contradict each other or are missing.
+    /// The virtual points are inconsistent or missing.
     #[error("{}: {reason}", path.display())]
     VirtualPoint {
         /// The workbook.
@@ -63,12 +64,12 @@ pub enum PositionsError {
     },
 }
 
-/// What was read, and what a reader of the results must know about it.
+/// The geometry, and warnings for the user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Positions {
     /// The geometry.
     pub geometry: Geometry,
-    /// E.g. directions that were not of unit length.
+    /// For example directions that were not unit vectors.
     pub warnings: Vec<String>,
 }
 
@@ -114,7 +115,7 @@ struct Reading<'a> {
     warnings: Vec<String>,
 }
 
-/// One sheet with its headings found.
+/// One sheet with the columns of its headings.
 struct Sheet<'a> {
     path: &'a Path,
     name: &'a str,
@@ -206,7 +207,7 @@ impl Reading<'_> {
         Ok(points)
     }
 
-    /// Positions of both virtual points, which the tables of motions and of forces must agree on.
+    /// Positions of both virtual points, on which the sheets of motions and forces must agree.
     fn virtual_points(&mut self) -> Result<[[f64; 3]; 2], PositionsError> {
         let fail = |path: &Path, reason: String| PositionsError::VirtualPoint { path: path.into(), reason };
         let mut found: [Option<[f64; 3]>; 2] = [None, None];
@@ -285,7 +286,8 @@ fn point(sheet: &Sheet<'_>, row: usize, cells: &[Cell]) -> Result<(Point, Option
         ));
     }
     let mut warning = None;
-    // Directions typed with three decimals are off by 1e-3 and still meant as unit vectors; say so from there on.
+    // A direction typed with three decimals may be off by 1e-3 and is still meant as a unit vector;
+    // warn only beyond that.
     if (length - 1.0).abs() > 1e-3 {
         warning = Some(format!(
             "sheet `{}`, row {row}: the direction of {description} has length {length:.4} and was normalised",
@@ -319,7 +321,7 @@ mod tests {
         assert_eq!(xlsx.geometry.a.output_names()[2], "A1:z");
     }
 
-    /// The good csv tables in a temporary folder, with one table edited.
+    /// The valid csv tables in a temporary folder, with one table edited.
     fn edited(table: &str, edit: impl Fn(&str) -> String) -> tempfile::TempDir {
         let dir = tempfile::tempdir().expect("a temporary folder");
         for entry in fs::read_dir(Path::new(DATA).join("csv")).expect("test data") {

@@ -1,4 +1,5 @@
-//! Geometry as a folder of csv tables, in the form of the pyFBS workbook that [`super::read_positions`] reads.
+//! Writes a geometry as a folder of csv tables, in the form of the pyFBS workbook that
+//! [`super::read_positions`] reads.
 
 use super::positions::PositionsError;
 use crate::structure::Structure;
@@ -18,10 +19,10 @@ const HEADINGS: [&str; 10] = [
     "Direction_3",
 ];
 
-/// Writes the eight tables into `folder`, which must be there.
+/// Writes the eight tables into `folder`, which must exist.
 ///
 /// # Errors
-/// [`PositionsError::Open`] naming the folder and why a table cannot be written.
+/// [`PositionsError::Open`] with the table and why it cannot be written.
 pub fn write_positions(
     folder: &Path,
     geometry: &Geometry,

@@ -1,27 +1,27 @@
-//! Impact records as a file has them: with the units that they were in, and with the signed axes that
-//! labels name. Responses are turned to x, y and z, or into the axes that a plan has for the place.
+//! Impact records of a file with their units and the signed axes of their labels. Responses are
+//! turned to x, y and z, or to the axes that a plan gives for the location.
 
 use super::direction::{Beside, along, axis_name, beside, turned_words, vector_name, vector_names};
 use crate::spectra::ImpactRecords;
 
-/// Impact records as a file has them, in SI, with what its labels say besides.
+/// Impact records of a file in SI, with the information from its labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordFile {
     /// The hits.
     pub records: ImpactRecords,
-    /// How late each response is against the force, s.
+    /// Delay of each response relative to the force, s.
     pub delay_s: Vec<f64>,
-    /// Along which axes force and responses are positive.
+    /// Positive directions of force and responses.
     pub directions: Directions,
-    /// What was read, in one line: `velocity in mm/s, force in lbf, A1 along −z turned`.
+    /// A one-line description of what was read: `velocity in mm/s, force in lbf, A1 along −z
+    /// turned`.
     pub taken: String,
-    /// What was left out, or put in step.
+    /// What was left out or aligned in time.
     pub notes: Vec<String>,
 }
 
 impl RecordFile {
-    /// The same with responses along x, y and z in this order, turned where their labels name a negative
-    /// axis.
+    /// Puts responses in the order x, y, z, and changes the sign of those along a negative axis.
     #[must_use]
     pub fn along_axes(mut self) -> Self {
         let turned = self.directions.turn_to_axes(&mut self.records, &mut self.delay_s);
@@ -30,10 +30,10 @@ impl RecordFile {
         self
     }
 
-    /// The same in the order and along the directions that a plan has for the cell.
+    /// Puts responses in the order and along the directions that a plan gives for the cell.
     ///
     /// # Errors
-    /// A label and the plan contradict one another: both are named.
+    /// A label and the plan contradict one another; the message names both.
     pub fn along_plan(mut self, place: &PlannedPlace<'_>) -> Result<Self, String> {
         let told = self.directions.to_plan(&mut self.records, &mut self.delay_s, place)?;
         self.taken.extend(told.iter().map(|words| format!(", {words}")));
@@ -41,16 +41,16 @@ impl RecordFile {
     }
 }
 
-/// Directions of a hit's force and responses, as their labels have them; 0 where a label says none.
+/// Directions of a hit's force and responses from their labels; 0 where a label has none.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Directions {
-    /// Of the force.
+    /// Direction of the force.
     pub force: i64,
-    /// Of each response, in the order of the records.
+    /// Direction of each response, in the order of the records.
     pub responses: Vec<i64>,
 }
 
-/// Puts channels `order` of every hit in this order.
+/// Reorders the channels of every hit by `order`.
 fn reorder(records: &mut ImpactRecords, order: &[usize]) {
     for hit in &mut records.response {
         let mut own: Vec<Vec<f64>> = order.iter().map(|at| std::mem::take(&mut hit[*at])).collect();
@@ -64,8 +64,8 @@ fn turn(records: &mut ImpactRecords, channel: usize) {
 }
 
 impl Directions {
-    /// Puts responses that are along different axes in the order x, y, z, and turns what is along a
-    /// negative axis; gives what was turned.
+    /// Puts responses that are along different axes in the order x, y, z, and changes the sign of
+    /// those along a negative axis; returns the directions that were turned.
     pub(super) fn turn_to_axes(&mut self, records: &mut ImpactRecords, delay_s: &mut [f64]) -> Vec<i64> {
         let mut order: Vec<usize> = (0..self.responses.len()).collect();
         let axes: Vec<i64> = self.responses.iter().map(|d| d.saturating_abs()).collect();
@@ -95,11 +95,11 @@ impl Directions {
         }
     }
 
-    /// Puts the responses in the order of a plan's `axes` for their location and turns them into these,
-    /// and the force into the plan's `push`; gives what a person must know of it.
+    /// Puts the responses in the order and along the directions of a plan's `axes` for their
+    /// location, and the force along the plan's `push`; returns notes for the user.
     ///
     /// # Errors
-    /// A label and the plan contradict one another: both are named.
+    /// A label and the plan contradict one another; the message names both.
     pub fn to_plan(
         &mut self,
         records: &mut ImpactRecords,
@@ -108,7 +108,7 @@ impl Directions {
     ) -> Result<Vec<String>, String> {
         let mut told = self.force_to_plan(records, place)?;
         let PlannedPlace { response, axes, .. } = *place;
-        // without labels the order is the plan's; another number of channels is refused elsewhere
+        // without labels the plan's order applies; a wrong number of channels is refused elsewhere
         if self.responses.len() != axes.len() || self.responses.iter().all(|d| *d == 0) {
             return Ok(told);
         }
@@ -152,7 +152,8 @@ impl Directions {
         Ok(told)
     }
 
-    /// For each of `axes` the channel whose label is to it as `wanted` has it; none where one is missing.
+    /// For each of `axes` a channel whose label relates to it as `wanted` requires; `None` where
+    /// one is missing.
     fn order_along(&self, axes: &[[f64; 3]], wanted: impl Fn(Beside) -> bool + Copy) -> Option<Vec<usize>> {
         let Some((axis, rest)) = axes.split_first() else { return Some(Vec::new()) };
         (0..self.responses.len()).find_map(|at| {
@@ -160,7 +161,7 @@ impl Directions {
             if label == 0 || !wanted(beside(label, *axis)) {
                 return None;
             }
-            // a slanted axis may be near two labels: each is tried
+            // an oblique axis may match two labels, so each is tried
             let mut left = self.clone();
             left.responses[at] = 0;
             let mut order = left.order_along(rest, wanted)?;
@@ -169,7 +170,8 @@ impl Directions {
         })
     }
 
-    /// The channels in the order of labels x, y, z, where these number a triaxial sensor's own axes.
+    /// The channels in the order of labels x, y, z, where these number the axes of a triaxial
+    /// sensor.
     fn own_numbers(&self, place: &PlannedPlace<'_>) -> Option<Vec<usize>> {
         let numbered = |axis: i64| self.responses.iter().position(|d| *d == axis);
         let order = [numbered(1)?, numbered(2)?, numbered(3)?];
@@ -191,7 +193,8 @@ impl Directions {
         };
         match beside(self.force, place.push) {
             Beside::Same => Ok(Vec::new()),
-            // a hammer pushes: a force that is positive along the other way is no push of the plan's
+            // a hammer only pushes: a force that is positive against the plan's direction
+            // contradicts it
             Beside::Opposite if records.force_n.iter().any(|force| is_push(force)) => contradiction(),
             Beside::Opposite => {
                 records.force_n.iter_mut().flatten().for_each(|v| *v = -*v);
@@ -208,25 +211,25 @@ impl Directions {
     }
 }
 
-/// Whether a hit's force is higher above zero than below.
+/// Whether the largest positive force of a hit exceeds the largest negative one.
 fn is_push(force_n: &[f64]) -> bool {
     let (low, high) =
         force_n.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     high > -low
 }
 
-/// Where a plan has the hammer and the sensor of a cell.
+/// A plan's impact and response location of a cell.
 #[derive(Debug, Clone, Copy)]
 pub struct PlannedPlace<'p> {
     /// Name of the impact.
     pub impact: &'p str,
-    /// Where the hammer pushes, a unit vector.
+    /// Direction in which the hammer pushes, a unit vector.
     pub push: [f64; 3],
     /// Name of the response location.
     pub response: &'p str,
-    /// What each channel there feels, unit vectors.
+    /// Measuring direction of each channel at the location, unit vectors.
     pub axes: &'p [[f64; 3]],
-    /// Whether the plan gives these axes itself, instead of x, y and z.
+    /// Whether the plan defines these axes itself, instead of using x, y and z.
     pub own_axes: bool,
 }
 
@@ -241,7 +244,7 @@ mod tests {
     const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
     const SLANTED: [f64; 3] = [0.7071, 0.7071, 0.0];
 
-    /// A hit whose channels are 1, 2, 3.
+    /// A hit whose channels have the values 1, 2, 3.
     fn hit(force: f64, channels: usize) -> ImpactRecords {
         ImpactRecords {
             fs_hz: 1000.0,
@@ -305,7 +308,8 @@ mod tests {
             (&[DOWN], &[-3], &[1.0], ""),
             (&[X, Z], &[-3, 1], &[2.0, -1.0], "A1 along −z turned"),
             (&[X, Z], &[0, 0], &[1.0, 2.0], ""),
-            // a sensor mounted upside down whose channels are numbered, and one whose labels say the plan's axes
+            // a sensor mounted upside down whose labels number its channels, and one whose labels
+            // are the plan's axes
             (&[X, [0.0, -1.0, 0.0], DOWN], &[1, 2, 3], &[1.0, 2.0, 3.0], "own channels"),
             (&[X, [0.0, -1.0, 0.0], DOWN], &[1, -2, -3], &[1.0, 2.0, 3.0], ""),
             (&[X, [0.0, -1.0, 0.0], DOWN], &[1, -2, 3], &[1.0, 2.0, -3.0], "A1 along +z turned"),

@@ -10,12 +10,14 @@ use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::path::Path;
 
-/// Most hits of a file, and most channels of a hit: more is an axis in the wrong place.
+/// Most hits of a file, and most channels of a hit: larger numbers mean that the axes are in the
+/// wrong order.
 pub(super) const MOST_HITS: usize = 10_000;
 pub(super) const MOST_CHANNELS: usize = 1000;
 
-/// Reads impact records: `fs` (Hz), `force` (hit, sample) N, `response` (hit, channel, sample) SI, `quantity` = velocity |
-/// acceleration | displacement. One hit may come without the hit axis, one channel without the channel axis.
+/// Reads impact records: `fs` (Hz), `force` (hit, sample) N, `response` (hit, channel, sample) SI,
+/// `quantity` = velocity | acceleration | displacement. A single hit may omit the hit axis, a
+/// single channel the channel axis.
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
@@ -23,11 +25,11 @@ pub fn read_impacts(path: &Path) -> Result<ImpactRecords, NpzError> {
     read_records(path, &StatedUnits::default()).map(|read| read.records)
 }
 
-/// The same with what was taken: `unit_force`, `unit_response` and `unit_fs` may name other units, and
-/// `stated` ones count instead.
+/// As [`read_impacts`], together with units and directions. `unit_force`, `unit_response` and
+/// `unit_fs` may name other units; `stated` units override them.
 ///
 /// # Errors
-/// As [`read_impacts`]; also for units that are not known or contradict the quantity.
+/// As [`read_impacts`]; also for units that are unknown or contradict the quantity.
 pub fn read_records(path: &Path, stated: &StatedUnits) -> Result<RecordFile, NpzError> {
     let mut file = NpzFile::open(path)?;
     file.refuse_other_units(&["unit_force", "unit_response", "unit_fs"])?;
@@ -119,7 +121,8 @@ fn si_unit(quantity: MotionQuantity) -> &'static str {
     }
 }
 
-/// Signals of `each` samples, from the last to the first, so that there is never a second copy of all.
+/// Splits values into signals of `each` samples, from the last to the first, so that there is never
+/// a second copy of all values.
 fn apart(mut all: Vec<f64>, each: usize) -> Vec<Vec<f64>> {
     let mut signals = Vec::with_capacity(all.len().div_ceil(each));
     while !all.is_empty() {
@@ -130,7 +133,7 @@ fn apart(mut all: Vec<f64>, each: usize) -> Vec<Vec<f64>> {
     signals
 }
 
-/// Writes impact records in the same form.
+/// Writes impact records in the form that [`read_impacts`] reads.
 ///
 /// # Errors
 /// [`NpzError::Write`]; [`NpzError::Content`] when hits differ in length.
@@ -153,10 +156,11 @@ pub fn write_impacts(path: &Path, records: &ImpactRecords) -> Result<(), NpzErro
     out.finish()
 }
 
-/// Reads a hysteresis record: `fs`, `velocity_a` and `velocity_b` (m/s) or `displacement_a` and `displacement_b` (m), `force` (N)
-/// or `load_cells` (cell, sample; summed), optional `excitation` (Hz) and `normal_load` (N). Other units may be named by `unit_velocity`,
-/// `unit_displacement`, `unit_force` (also of the load) and `unit_fs`. The motions are taken for the contact's own, unless
-/// `measured` says "beside the contact" ([`is_beside_the_contact`]).
+/// Reads a hysteresis record: `fs`, `velocity_a` and `velocity_b` (m/s) or `displacement_a` and
+/// `displacement_b` (m), `force` (N) or `load_cells` (cell, sample; summed), optional `excitation`
+/// (Hz) and `normal_load` (N). Other units may be named by `unit_velocity`, `unit_displacement`,
+/// `unit_force` (also for the load) and `unit_fs`. The motions are taken as those of the contact
+/// itself, unless `measured` is "beside the contact" ([`is_beside_the_contact`]).
 ///
 /// # Errors
 /// [`NpzError`] naming the array that is missing or does not fit.
@@ -240,7 +244,7 @@ pub fn read_hysteresis(path: &Path) -> Result<HysteresisRecord, NpzError> {
     Ok(HysteresisRecord { fs_hz, motion, force_n, excitation_hz, normal_load_n })
 }
 
-/// Writes a hysteresis record in the same form (the force summed).
+/// Writes a hysteresis record in the form that [`read_hysteresis`] reads (the force summed).
 ///
 /// # Errors
 /// [`NpzError::Write`].
@@ -248,7 +252,8 @@ pub fn write_hysteresis(path: &Path, record: &HysteresisRecord) -> Result<(), Np
     write_loop(path, record, None)
 }
 
-/// The same of a rig's level, whose motions are those of spots beside the contact: the array `measured` says so.
+/// As [`write_hysteresis`], for a level of a rig, whose motions are measured next to the contact:
+/// the array `measured` states this.
 ///
 /// # Errors
 /// [`NpzError::Write`].
@@ -256,10 +261,10 @@ pub fn write_level(path: &Path, record: &HysteresisRecord) -> Result<(), NpzErro
     write_loop(path, record, Some(BESIDE))
 }
 
-/// Whether a file says of its motions that they are not the contact's own.
+/// Whether a file states that its motions were measured next to the contact.
 ///
 /// # Errors
-/// [`NpzError`] where it cannot be read, or says what nobody knows.
+/// [`NpzError`] where it cannot be read, or `measured` has an unknown value.
 pub fn is_beside_the_contact(path: &Path) -> Result<bool, NpzError> {
     let mut file = NpzFile::open(path)?;
     if !file.has("measured") {
@@ -269,7 +274,7 @@ pub fn is_beside_the_contact(path: &Path) -> Result<bool, NpzError> {
     if word == BESIDE { Ok(true) } else { Err(file.unexpected("measured", &format!("is `{word}`"), BESIDE)) }
 }
 
-/// Where the motions of a level were measured.
+/// Value of `measured` for motions measured next to the contact.
 const BESIDE: &str = "beside the contact";
 
 fn write_loop(path: &Path, record: &HysteresisRecord, measured: Option<&str>) -> Result<(), NpzError> {

@@ -1,8 +1,9 @@
-//! Impact records in universal files: time responses (function type 1), hit after hit.
+//! Impact records in universal files: time responses (function type 1), one hit after another.
 //!
-//! A function whose ordinate is a force begins a hit; the motions that follow it, up to the next force,
-//! are its responses. Labels and data set 164 give the units. A response whose first sample is later than
-//! the force's is put in step: by whole samples, and the rest as its delay.
+//! A function whose ordinate is a force begins a hit; the motions that follow it, up to the next
+//! force, are its responses. Labels and data set 164 give the units. A response whose first sample
+//! is later than the force's is aligned in time by whole samples; the remainder is stored as its
+//! delay.
 
 use super::direction::axis_name;
 use super::frf_uff::label;
@@ -20,13 +21,13 @@ use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Why a file gives no impact records.
+/// Why impact records could not be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordFileError {
-    /// It cannot be read, or is of another program's format.
+    /// The file cannot be read, or has another program's format.
     #[error(transparent)]
     Open(#[from] frf_file::FrfFileError),
-    /// It is an npz file that holds no impact records.
+    /// It is an npz file without impact records.
     #[error(transparent)]
     Npz(#[from] NpzError),
     /// It is not an npz file, and as a universal file it holds no impact records.
@@ -34,7 +35,7 @@ pub enum RecordFileError {
     Uff(#[from] FrfUffError),
 }
 
-/// Reads impact records from an npz or a universal file. `stated` units count instead of the file's.
+/// Reads impact records from an npz or a universal file. `stated` units override the file's.
 ///
 /// # Errors
 /// [`RecordFileError`] with the file and what is wrong in it.
@@ -47,27 +48,27 @@ pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile,
         .map_err(|reason| FrfUffError::Content { path: path.into(), reason })?)
 }
 
-/// The functions of a universal file that may hold records.
+/// Reads the functions of a universal file that may hold records.
 ///
 /// # Errors
-/// It cannot be read, or is of another program's format.
+/// The file cannot be read, or has another program's format.
 pub fn record_contents(path: &Path) -> Result<Contents, RecordFileError> {
     frf_file::refuse_other_formats(path, Wanted::Records)?;
     Ok(frf_uff::contents(path)?)
 }
 
-/// Records of one place of impact and one sensor, with the names that the labels give them.
+/// Records of one impact point and one sensor, with the names from their labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledRecords {
-    /// Where the hammer struck: the force's own entity, or its node.
+    /// The impact point: the force's entity, or its node.
     pub impact: String,
-    /// Where the sensor was.
+    /// The sensor.
     pub response: String,
     /// The hits.
     pub read: RecordFile,
 }
 
-/// A signal of a hit, and the units that its file has for it.
+/// A signal of a hit, and the units that its file gives for it.
 #[derive(Clone)]
 struct Signal<'c> {
     function: &'c Function,
@@ -75,25 +76,25 @@ struct Signal<'c> {
     system: Option<UnitSystem>,
 }
 
-/// A hit: its force first, then its responses.
+/// A hit: the force first, then the responses.
 type Hit<'c> = Vec<Signal<'c>>;
 
-/// The records among what was read of a file.
+/// Extracts the impact records from the contents of a universal file.
 ///
 /// # Errors
-/// The reason in words.
+/// What is wrong, in words.
 pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<RecordFile, String> {
     let (hits, notes) = hits(contents)?;
     let read = records(&hits, stated)?;
     Ok(RecordFile { notes: [notes, read.notes].concat(), ..read })
 }
 
-/// The same, apart by place of impact and by sensor, as the labels name them: one hit that several sensors
-/// felt fills as many rows. A label whose entity `is_known` is called by it, any other by its entity
-/// without the axis that it may name (`1+X`).
+/// As [`from_contents`], but separated by impact point and sensor, which the labels name: a hit
+/// that several sensors measured goes into one row per sensor. A label is named by its entity if
+/// `is_known` accepts it, else by its entity without the axis that it may end with (`1+X`).
 ///
 /// # Errors
-/// The reason in words, also where a label names neither entity nor node.
+/// What is wrong, in words; also a label that names neither entity nor node.
 pub fn by_label(
     contents: &Contents,
     stated: &StatedUnits,
@@ -115,7 +116,7 @@ pub fn by_label(
                 .ok_or_else(|| format!("a response of hit {number} names neither entity nor node"))?;
             match own.iter_mut().find(|(known, _)| *known == name) {
                 Some((_, functions)) => functions.push(response.clone()),
-                // a hit has no more responses than a rig has sensors
+                // linear search: a hit has at most as many responses as a rig has sensors
                 None => own.push((name, vec![force.clone(), response.clone()])),
             }
         }
@@ -134,12 +135,12 @@ pub fn by_label(
     Ok((labelled.collect::<Result<_, String>>()?, notes))
 }
 
-/// Whether there is a force over time among the contents: impact records, and not FRFs.
+/// Whether the contents include a force over time, that is impact records and not FRFs.
 pub fn holds_records(contents: &Contents) -> bool {
     contents.functions().any(|f| f.kind == kind::TIME && is_force(f))
 }
 
-/// Whether a function's ordinate is a force: by its type, or where that is open by its unit.
+/// Whether a function's ordinate is a force: by its type, or by its unit where the type is unknown.
 fn is_force(f: &Function) -> bool {
     let axis = &f.axes[1];
     match axis.quantity {
@@ -151,7 +152,7 @@ fn is_force(f: &Function) -> bool {
     }
 }
 
-/// What a label calls its place; none where it names neither entity nor node.
+/// The label of a place; `None` where it names neither entity nor node.
 fn name_of(dof: &Dof) -> Option<Label> {
     let own = label(dof);
     (!own.entity.is_empty() || dof.node != 0).then_some(own)
@@ -196,7 +197,7 @@ fn hits(contents: &Contents) -> Result<(Vec<Hit<'_>>, Vec<String>), String> {
     }
 }
 
-/// Hits that one force and the same responses describe.
+/// Combines hits with the same force point and the same responses.
 fn records(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<RecordFile, String> {
     let Some(first) = hits.first() else { return Err("there is no hit".into()) };
     let (channels, samples) = (first.len() - 1, first[0].values.len());
@@ -287,7 +288,7 @@ fn records(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<RecordFile, String>
     })
 }
 
-/// Most units of one file.
+/// Most units listed for one file.
 const MOST_WORDS: usize = 8;
 
 fn named(place: usize, signal: &Signal<'_>) -> String {
@@ -300,8 +301,8 @@ fn named(place: usize, signal: &Signal<'_>) -> String {
     }
 }
 
-/// The signals of a hit in the order of the first hit's, which their labels tell; labels that differ
-/// nowhere leave the order as it is. None where a hit has labels that the first one has not.
+/// The signals of a hit in the order of the first hit's, by their labels. If the first hit's labels
+/// are not distinct, the order is kept. `None` if the first hit has a label that this hit lacks.
 fn in_order_of<'h, 'c>(first: &[Signal<'_>], hit: &'h [Signal<'c>]) -> Option<Vec<&'h Signal<'c>>> {
     let place = |signal: &Signal<'_>| signal.function.response.clone();
     let is_own = |i: usize| !first[1..i].iter().any(|before| place(before) == place(&first[i]));
@@ -322,22 +323,22 @@ fn in_order_of<'h, 'c>(first: &[Signal<'_>], hit: &'h [Signal<'c>]) -> Option<Ve
 struct Timing {
     /// The sampling of the first hit's signals, the force first.
     first: Vec<Sampling>,
-    /// The force's in the hit that is read.
+    /// The sampling of the force in the hit being read.
     force: Option<Sampling>,
-    /// The most precise rate so far.
+    /// The sampling with the smallest error of its rate so far.
     rate: Option<Sampling>,
 }
 
-/// What is left of each signal.
+/// The samples that are kept of each signal.
 struct Cut {
-    /// First sample of each that counts, the force's first.
+    /// First sample kept of each signal, the force's first.
     from: Vec<usize>,
     samples: usize,
 }
 
-/// Rates this close are one, beside what their digits leave open.
+/// Rates that differ by less than this, relative and beyond their printed digits, are equal.
 const SAME_RATE: f64 = 1e-6;
-/// Starts that differ by less than this part of a sample are one, beside what their digits leave open.
+/// Starts that differ by less than this part of a sample, beyond their printed digits, are equal.
 const SAME_START: f64 = 1e-3;
 
 impl Timing {
@@ -347,7 +348,7 @@ impl Timing {
         })
     }
 
-    /// Adds the signal at `place` of a hit, the force at 0 first.
+    /// Adds the signal at `place` of a hit; the force has place 0 and is added first.
     fn add(&mut self, place: usize, own: Sampling) -> Result<(), String> {
         if self.rate.is_none_or(|known| own.fs_error < known.fs_error) {
             self.rate = Some(own);
@@ -371,8 +372,8 @@ impl Timing {
         Ok(())
     }
 
-    /// The rate, what is left of each signal when all begin together, how late each response then is, and
-    /// what a person must know of it.
+    /// The rate, the samples kept of each signal so that all begin together, the remaining delay of
+    /// each response, s, and a note if a response started at another time than the force.
     fn in_step(&self, samples: usize) -> Result<(f64, Cut, Vec<f64>, Option<String>), String> {
         let (Some(force), Some(rate)) = (self.first.first(), self.rate) else {
             return Err("there is no hit".into());
@@ -408,7 +409,8 @@ impl Timing {
     }
 }
 
-/// The one quantity that all responses measure, by their types or, where one is open, by its unit.
+/// The quantity that all responses measure: by their types or, where the type is unknown, by their
+/// unit.
 fn motion(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<MotionQuantity, String> {
     let mut found: Vec<i64> = Vec::new();
     for signal in hits.iter().flat_map(|hit| &hit[1..]) {
@@ -421,7 +423,7 @@ fn motion(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<MotionQuantity, Stri
             quantity::UNKNOWN if by_unit(Dimension::DISPLACEMENT) => quantity::DISPLACEMENT,
             own => own,
         };
-        // two are one too many already
+        // a few are enough: two different quantities are already an error
         if found.len() < 4 && !found.contains(&quantity) {
             found.push(quantity);
         }
@@ -473,7 +475,7 @@ mod tests {
         let path = folder.path().join("row.uff");
         write_records(&path, &records(), "A1", "AZ1").expect("written");
         let mut contents = read(&std::fs::read(&path).expect("there"));
-        // behind each hit's responses, those of a second sensor that knows its node only
+        // after each hit's responses, add those of a second sensor that has only a node number
         let mut sets = Vec::new();
         for set in contents.sets.drain(..) {
             let DataSet::Function(function) = set else {
@@ -509,7 +511,7 @@ mod tests {
             });
             functions.skip(at).take(1).for_each(|f| change(f));
         };
-        // x and z change places, one of them looks the other way
+        // x and z are exchanged, and one of them has the opposite sign
         for hit in 0..3 {
             change(&mut contents, 4 * hit + 1, &|f| f.response.direction = -3);
             change(&mut contents, 4 * hit + 3, &|f| f.response.direction = 1);
@@ -536,7 +538,7 @@ mod tests {
         assert!(from_contents(&Contents::default()).expect_err("nothing").contains("type 13"));
     }
 
-    /// What was exported, each function changed by its hit and its place in it.
+    /// What was exported, each function changed according to its hit and its place in it.
     fn changed(mut change: impl FnMut(usize, usize, &mut Function)) -> Contents {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("cell.uff");
@@ -571,7 +573,7 @@ mod tests {
             f.axes[0].unit = "ms".into();
             f.abscissa = Abscissa::Even { start: 0.0, step: 1e3 / 51_200.0 };
         });
-        // the file's own data set says SI, which contradicts these labels
+        // the file's data set 164 states SI, which contradicts these labels
         let said = taken(&contents).expect_err("a contradiction");
         assert!(said.contains("`lbf`") && said.contains("data set 164"), "{said}");
         let mut without = contents.clone();
@@ -617,7 +619,7 @@ mod tests {
         assert_eq!(read.records.force_n[0], records().force_n[0][..63]);
         assert_eq!(read.records.response[0][1], records().response[0][1][1..]);
         assert!(taken(&late([64.0, 0.0, 0.0])).expect_err("beyond").contains("longer than the record"));
-        // all begin before the trigger: nothing is late
+        // all begin before the trigger: no delay
         let together = changed(|_, _, f| f.abscissa = Abscissa::Even { start: -0.01, step });
         let read = taken(&together).expect("read");
         assert_eq!((read.records, read.delay_s), (records(), vec![0.0; 3]));

@@ -1,5 +1,5 @@
-//! read(write(x)) = x for every format that is both written and read. Universal data sets of every kind are in `uff/round_trip.rs`,
-//! arrays of any type in `any_bytes_tests.rs`.
+//! read(write(x)) = x for every format that is both written and read. Universal data sets of every
+//! kind are tested in `uff/round_trip.rs`, arrays of any type in `any_bytes_tests.rs`.
 
 use super::frf_uff::{read_frf_uff, to_functions, write_uff};
 use super::positions_output::write_positions;
@@ -19,7 +19,7 @@ use num_complex::Complex;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Numbers of twelve digits, which text of thirteen keeps.
+/// Numbers of twelve digits, which columns of thirteen characters preserve.
 fn twelve_digits() -> impl Strategy<Value = f64> {
     (-1_000_000_000_000i64..1_000_000_000_000, -20..20i32)
         .prop_map(|(n, exponent)| format!("{n}e{exponent}").parse().expect("a number"))

@@ -1,5 +1,5 @@
-//! Sheets of a workbook, or csv files of a folder, as plain rows of cells: the named ones only, cell by cell, and no more of them than a
-//! geometry can have.
+//! Sheets of a workbook, or csv files of a folder, as rows of cells. Only the requested tables are
+//! read, cell by cell, up to the size that a geometry can have.
 
 use calamine::{DataRef, Reader, Xlsx};
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use super::workbook_parts;
 use crate::advice;
 use crate::foreign::{self, megabytes};
 
-/// A cell: text as it stands, or a number.
+/// A cell: text as written, or a number.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell {
     Empty,
@@ -18,29 +18,29 @@ pub(super) enum Cell {
     Number(f64),
 }
 
-/// Rows of one sheet with the spreadsheet's row number of each.
+/// Rows of one sheet, each with its row number in the spreadsheet.
 pub(super) type Table = Vec<(usize, Vec<Cell>)>;
 
-/// What was found: the tables that were asked for, and the names of all.
+/// The requested tables, and the names of all tables found.
 #[derive(Debug, Default)]
 pub(super) struct Tables {
     pub named: BTreeMap<String, Table>,
     pub available: Vec<String>,
 }
 
-/// Most rows of a table: a row is a channel or an impact.
+/// Most rows of a table; a row is a channel or an impact.
 const MOST_ROWS: usize = 10_000;
-/// Most columns: a geometry has some ten.
+/// Most columns; a geometry has about ten.
 const MOST_COLUMNS: usize = 256;
-/// Most cells of all tables, and bytes of text in them.
+/// Most cells of all tables together, and most bytes of text in them.
 const MOST_CELLS: usize = 500_000;
 const MOST_TEXT: usize = 8 << 20;
-/// Most bytes of a workbook.
+/// Largest workbook, bytes.
 const MOST_BYTES: u64 = 8 << 20;
-/// Most sheets that a message names.
+/// Most sheets that a message lists.
 const MOST_NAMED: usize = 40;
 
-/// What may still be read of all tables.
+/// What may still be read, over all tables.
 struct Room {
     cells: usize,
     text: usize,
@@ -49,7 +49,7 @@ struct Room {
 impl Room {
     const ALL: Room = Room { cells: MOST_CELLS, text: MOST_TEXT };
 
-    /// Puts a cell into the table's last row. `at` is how a message names the place.
+    /// Puts a cell into a row. `at` returns the place for an error message.
     fn put(
         &mut self,
         row: &mut Vec<Cell>,
@@ -82,7 +82,7 @@ fn too_many_rows(at: &str) -> String {
     )
 }
 
-/// The wanted sheets of a workbook, or why it cannot be read.
+/// Reads the wanted sheets of a workbook, or returns why it cannot be read.
 pub(super) fn workbook_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String> {
     let bytes = foreign::bytes(path, MOST_BYTES).map_err(|error| told(&error))?;
     workbook_parts::refuse_lies(&bytes)?;
@@ -97,7 +97,7 @@ pub(super) fn workbook_tables(path: &Path, wanted: &[&str]) -> Result<Tables, St
         let of_sheet = |error: calamine::XlsxError| format!("sheet `{sheet}`: {error}");
         let mut cells = match workbook.worksheet_cells_reader(sheet) {
             Ok(cells) => cells,
-            // a sheet that holds a chart
+            // a sheet that contains a chart
             Err(calamine::XlsxError::NotAWorksheet(_)) => continue,
             Err(error) => return Err(of_sheet(error)),
         };
@@ -132,10 +132,11 @@ pub(super) fn workbook_tables(path: &Path, wanted: &[&str]) -> Result<Tables, St
     Ok(found)
 }
 
-/// A text longer than there is room for.
+/// A text longer than the remaining limit.
 struct TooLong;
 
-/// A cell with something in it. Many cells may name one text, which the workbook holds once: its length is looked at before it is copied.
+/// The contents of a cell; `None` if it is blank. Many cells may refer to one text that the
+/// workbook stores once, so its length is checked before it is copied.
 fn of_workbook(data: &DataRef<'_>, room: &Room) -> Result<Option<Cell>, TooLong> {
     let text = |text: &str| match text.len() <= room.text {
         true if text.trim().is_empty() => Ok(None),
@@ -152,7 +153,8 @@ fn of_workbook(data: &DataRef<'_>, room: &Room) -> Result<Option<Cell>, TooLong>
     }
 }
 
-/// The wanted csv files of a folder, named by their stems, or why they cannot be read.
+/// Reads the wanted csv files of a folder, named by their stems, or returns why they cannot be
+/// read.
 pub(super) fn csv_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String> {
     let mut room = Room::ALL;
     let mut left = foreign::TABLE;
@@ -185,7 +187,7 @@ pub(super) fn csv_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String>
 
 fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
     let delimiter = delimiter(text);
-    // a row is held as a whole, with a place for each column, before anybody can count them
+    // the csv reader allocates every column of a row before they can be counted
     let wide = |line: &str| line.bytes().filter(|byte| *byte == delimiter).count() >= MOST_COLUMNS;
     if let Some(at) = text.split('\n').position(wide) {
         return Err(format!(
@@ -198,11 +200,13 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
     let mut reader =
         csv::ReaderBuilder::new().delimiter(delimiter).has_headers(false).flexible(true).from_reader(from);
     let mut table: Table = Vec::new();
-    // lines are counted on from the row before: counting all of them for every row would take its time
+    // line numbers are counted from the previous row: counting from the start for every row would
+    // take quadratic time
     let (mut counted, mut line) = (0, 1);
     for record in reader.records() {
         let record = record.map_err(|error| error.to_string())?;
-        // The reader's own line number lags by one in files with CR LF; its byte position may stand on the ends of lines before the record.
+        // The reader's own line number is one too small in files with CR LF; its byte position may
+        // be at line ends before the record.
         let byte = record.position().map_or(0, |p| p.byte() as usize).max(counted);
         let ends = text.as_bytes()[byte..].iter().take_while(|byte| matches!(byte, b'\r' | b'\n')).count();
         let end = byte + ends;
@@ -216,7 +220,7 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
         for (column, text) in record.iter().enumerate() {
             let cell = match text.trim_start_matches('\u{feff}').trim() {
                 "" => Cell::Empty,
-                // what a spreadsheet writes first to say its delimiter
+                // the first line with which a spreadsheet program declares its delimiter
                 text if table.is_empty() && text.to_lowercase().starts_with("sep=") => Cell::Empty,
                 text => match decimal(text, delimiter) {
                     Some(number) => Cell::Number(number),
@@ -230,15 +234,15 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
     Ok(table)
 }
 
-/// What stands between the cells of a table, by the line of its headings: a comma, or a semicolon or a tab
-/// where there are more of these.
+/// The delimiter of a table, from the line of its headings: a comma, or a semicolon or a tab where
+/// there are more of these.
 pub(crate) fn delimiter(text: &str) -> u8 {
     let heading = text.lines().find(|line| line.contains([',', ';', '\t'])).unwrap_or_default();
     let count = |delimiter: u8| heading.bytes().filter(|byte| *byte == delimiter).count();
     [b',', b';', b'\t'].into_iter().rev().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b',')
 }
 
-/// A number with a decimal comma, in a table whose cells are not parted by commas.
+/// Parses a number with a decimal comma, in a table whose delimiter is not a comma.
 fn decimal(text: &str, delimiter: u8) -> Option<f64> {
     let comma = delimiter != b',' && text.matches(',').count() == 1 && !text.contains('.');
     let digits =
@@ -248,7 +252,7 @@ fn decimal(text: &str, delimiter: u8) -> Option<f64> {
 
 fn told(error: &std::io::Error) -> String {
     match error.kind() {
-        // the caller says what to give instead
+        // the caller's message says what to give instead
         ErrorKind::NotFound => error.to_string(),
         _ => format!("{error}; {}", advice::reading(error)),
     }

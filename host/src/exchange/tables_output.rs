@@ -1,4 +1,5 @@
-//! FRFs and records as text with commas: one row for each line or sample, one heading for each column.
+//! Writes FRFs and records as comma-separated text: one row per line or sample, one heading per
+//! column.
 
 use crate::advice;
 use crate::frf::Frf;
@@ -6,7 +7,7 @@ use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use crate::spectra::ImpactRecords;
 use std::path::{Path, PathBuf};
 
-/// A table that cannot be written.
+/// Why a table could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
 pub struct TableError {
@@ -14,7 +15,8 @@ pub struct TableError {
     source: std::io::Error,
 }
 
-/// `frequency_hz`, and for each pair `OUTPUT/INPUT re`, `… im`, `… coherence`. A missing value is empty.
+/// Writes FRFs: `frequency_hz`, and for each pair `OUTPUT/INPUT re`, `… im`, `… coherence`. A
+/// missing value is empty.
 ///
 /// # Errors
 /// [`TableError`].
@@ -37,7 +39,8 @@ pub fn write_frf(path: &Path, frf: &Frf) -> Result<(), TableError> {
     })
 }
 
-/// `hit`, `time_s`, `force_n` and the responses in SI, hit after hit.
+/// Writes impact records: `hit`, `time_s`, `force_n` and the responses in SI, one hit after
+/// another.
 ///
 /// # Errors
 /// [`TableError`].
@@ -57,7 +60,8 @@ pub fn write_records(path: &Path, records: &ImpactRecords) -> Result<(), TableEr
     })
 }
 
-/// `time_s`, `velocity_a_m_per_s` and `velocity_b_m_per_s` (or `displacement_a_m` and `…_b_m`), `force_n`.
+/// Writes a loop: `time_s`, `velocity_a_m_per_s` and `velocity_b_m_per_s` (or `displacement_a_m`
+/// and `…_b_m`), `force_n`.
 ///
 /// # Errors
 /// [`TableError`].
@@ -73,7 +77,7 @@ pub fn write_loop(path: &Path, record: &HysteresisRecord) -> Result<(), TableErr
     })
 }
 
-/// The signals of a loop, under the names that they have as columns.
+/// The signals of a loop with their column names.
 pub fn loop_signals(record: &HysteresisRecord) -> [(&'static str, &[f64]); 3] {
     let [a, b]: [(&str, &[f64]); 2] = match &record.motion {
         RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
@@ -84,7 +88,7 @@ pub fn loop_signals(record: &HysteresisRecord) -> [(&'static str, &[f64]); 3] {
     [a, b, ("force_n", &record.force_n)]
 }
 
-/// Rows as they are, the heading first.
+/// Writes rows unchanged, the heading first.
 ///
 /// # Errors
 /// [`TableError`].
@@ -92,7 +96,7 @@ pub fn write_rows(path: &Path, rows: &[Vec<String>]) -> Result<(), TableError> {
     write_rows_of(path, rows.iter())
 }
 
-/// The same of rows that are made one by one.
+/// As [`write_rows`], with rows from an iterator.
 ///
 /// # Errors
 /// [`TableError`].
@@ -114,7 +118,7 @@ fn write(
             Ok(out.flush()?)
         })
         .map_err(|error| {
-            // as the operating system said it, or there is no telling what to do
+            // keep the operating system's error, from which the advice is derived
             let source = match error.into_kind() {
                 csv::ErrorKind::Io(source) => source,
                 other => std::io::Error::other(format!("{other:?}")),

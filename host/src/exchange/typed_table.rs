@@ -1,39 +1,41 @@
-//! A table whose columns have types: text with commas for people and spreadsheets, Parquet for engines.
+//! Tables with typed columns, written as comma-separated text for people and spreadsheets or as
+//! Parquet for query engines.
 
 use std::path::Path;
 
 use super::tables_output::{TableError, write_rows_of};
 
-/// What a column holds. Any value may be missing.
+/// The type of a column. Any value may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Whole numbers.
+    /// Integers.
     Whole,
-    /// Numbers.
+    /// Real numbers.
     Real,
-    /// Words.
+    /// Text.
     Text,
-    /// Times, RFC 3339.
+    /// Times in RFC 3339 format.
     Utc,
 }
 
 /// One value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// None, or not known.
+    /// Missing or unknown.
     Missing,
-    /// A whole number.
+    /// An integer.
     Whole(i64),
-    /// A number; NaN counts as missing.
+    /// A real number; NaN counts as missing.
     Real(f64),
-    /// A number that is stored in 32 bits: as text it has no more digits than that. NaN counts as missing.
+    /// A number that is stored in 32 bits and printed with no more digits than that. NaN counts as
+    /// missing.
     Single(f32),
-    /// A word or a time.
+    /// Text or a time.
     Text(String),
 }
 
 impl Value {
-    /// As it stands in a text; empty where it is missing.
+    /// The value as text; empty where it is missing.
     fn text(&self) -> String {
         match self {
             Value::Missing => String::new(),
@@ -60,7 +62,7 @@ value_of!(i64 => Whole, u32 => Whole, i8 => Whole, u8 => Whole, f64 => Real, f32
 
 impl From<usize> for Value {
     fn from(value: usize) -> Self {
-        // no count here comes near 2^63
+        // counts here never approach 2^63
         Value::Whole(i64::try_from(value).unwrap_or(i64::MAX))
     }
 }
@@ -79,7 +81,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Without a row.
+    /// A table without rows.
     pub fn new(columns: &'static [(&'static str, Kind)]) -> Self {
         Self { columns, rows: Vec::new() }
     }
@@ -87,7 +89,8 @@ impl Table {
     /// Adds a row.
     ///
     /// # Panics
-    /// Where it has not one value for each column: a fault of the caller, not of what is exported.
+    /// If the row does not have one value for each column: an error of the caller, not of the
+    /// exported data.
     pub fn push(&mut self, row: Vec<Value>) {
         assert_eq!(row.len(), self.columns.len(), "one value for each of {:?}", self.columns);
         self.rows.push(row);
@@ -103,7 +106,7 @@ impl Table {
         &self.rows
     }
 
-    /// Writes it as text with commas, the names first; a missing value is empty.
+    /// Writes the table as comma-separated text, the column names first; a missing value is empty.
     ///
     /// # Errors
     /// [`TableError`].

@@ -1,11 +1,12 @@
-//! What the axes of a universal file's functions measure: type and label of ordinate, denominator and
-//! abscissa, the units that data set 164 gives, and how many digits the places were printed with.
+//! The axes of a universal file's functions: types and labels of ordinate, denominator and
+//! abscissa, the units in data set 164, and the number of digits with which the abscissa was
+//! printed.
 
 use super::uff::{Abscissa, Axis, Contents, DataSet, Encoding, Function, Units, quantity};
 use super::units::{Dimension, StatedUnits, Unit, told};
 use crate::spectra::MotionQuantity;
 
-/// Data set 164: factors to which a value in SI is multiplied to be as in the file.
+/// Data set 164: factors by which SI values are multiplied to give the file's values.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct UnitSystem {
     length: f64,
@@ -13,7 +14,7 @@ pub(super) struct UnitSystem {
     description: String,
 }
 
-/// Factors of length and force that each code of data set 164 stands for.
+/// Factors of length and force for each unit code of data set 164.
 const CODES: [(i64, &str, f64, f64); 9] = [
     (1, "m and N", 1.0, 1.0),
     (2, "ft and lbf", 1.0 / 0.3048, 1.0 / 4.448_221_615_260_5),
@@ -26,7 +27,7 @@ const CODES: [(i64, &str, f64, f64); 9] = [
     (10, "mm and N", 1e3, 1.0),
 ];
 
-/// Factors that differ by less are one: writers give them four digits and more.
+/// Factors with a smaller relative difference are equal: writers print at least four digits.
 const SAME_FACTOR: f64 = 1e-3;
 
 fn same_factor(one: f64, other: f64) -> bool {
@@ -52,7 +53,7 @@ impl UnitSystem {
         Ok(UnitSystem { length: *length, force: *force, description })
     }
 
-    /// What a value of this dimension in the file is multiplied by to be in SI.
+    /// Factor from the file's unit of this dimension to SI.
     fn factor(&self, dimension: Dimension) -> f64 {
         dimension.factor(1.0 / self.length, 1.0 / self.force)
     }
@@ -70,10 +71,10 @@ impl UnitSystem {
     }
 }
 
-/// Every function of a file with the data set 164 before it.
+/// Every function of a file with the data set 164 that precedes it.
 ///
 /// # Errors
-/// A data set 164 that cannot be read, or contradicts itself.
+/// A data set 164 that cannot be read or contradicts itself.
 pub(super) fn with_units(contents: &Contents) -> Result<Vec<(&Function, Option<UnitSystem>)>, String> {
     if let Some(fault) = contents.faults.iter().find(|fault| fault.data_set == 164) {
         return Err(format!("the units of the file cannot be read ({fault}): export it again"));
@@ -89,28 +90,28 @@ pub(super) fn with_units(contents: &Contents) -> Result<Vec<(&Function, Option<U
     Ok(all)
 }
 
-/// The unit of one axis: its factor to SI, and how a person is told of it.
+/// The unit of one axis: its factor to SI, and its description for messages.
 struct Told {
     factor: f64,
-    /// Where it is a motion per force: the part of the factor that is of force.
+    /// For a motion per force: the part of the factor that comes from the force.
     per_force: Option<f64>,
     dimension: Dimension,
     words: String,
 }
 
-/// What an axis is, and what counts for its unit.
+/// An axis, and what determines its unit.
 struct Place<'a> {
     /// `ordinate`, `denominator`, `abscissa`.
     name: &'a str,
     axis: &'a Axis,
     system: Option<&'a UnitSystem>,
     stated: Option<&'a str>,
-    /// The part of `--units` that states it.
+    /// The key of `--units` that states this unit.
     key: &'a str,
 }
 
 impl Place<'_> {
-    /// Its unit, of the first of `wanted` that fits.
+    /// Its unit, of the first of the dimensions `wanted` that fits.
     fn unit(&self, wanted: &[Dimension]) -> Result<Told, String> {
         let Place { name, axis, system, stated, key } = self;
         let made = |unit: Unit, words: String| {
@@ -152,7 +153,7 @@ impl Place<'_> {
     }
 }
 
-/// A motion's quantity and dimension by its type in the file.
+/// The motions that an ordinate's type allows, with their dimensions.
 fn motions(axis: &Axis) -> Result<Vec<(MotionQuantity, Dimension)>, String> {
     let all = [
         (quantity::DISPLACEMENT, MotionQuantity::Displacement, Dimension::DISPLACEMENT),
@@ -173,7 +174,7 @@ fn motions(axis: &Axis) -> Result<Vec<(MotionQuantity, Dimension)>, String> {
     }
 }
 
-/// A type of an axis with its meaning.
+/// The number of an axis type with its meaning.
 pub(super) fn type_name(kind: i64) -> String {
     let known = [
         (quantity::UNKNOWN, "unknown"),
@@ -199,18 +200,18 @@ pub(super) fn type_name(kind: i64) -> String {
     }
 }
 
-/// A scale of values: their factor to SI, what they are, and how a person is told of it.
+/// The scale of values: their factor to SI, their quantity, and a description for messages.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scale {
     pub factor: f64,
     pub quantity: MotionQuantity,
-    /// `mobility in (mm/s)/N`.
+    /// For example `mobility in (mm/s)/N`.
     pub words: String,
-    /// What is not sure.
+    /// What is uncertain.
     pub note: Option<String>,
 }
 
-/// What is wanted of a motion: its own dimensions, of a rotation those too; and each per force.
+/// Dimensions allowed for a motion; for a rotation, the angular ones too.
 fn wanted_of(motions: &[(MotionQuantity, Dimension)], rotates: bool) -> Vec<Dimension> {
     let own = motions.iter().map(|(_, dimension)| *dimension);
     if rotates { own.clone().map(Dimension::rotating).chain(own).collect() } else { own.collect() }
@@ -220,7 +221,7 @@ fn rotates(f: &Function) -> bool {
     (4..=6).contains(&f.response.direction.saturating_abs())
 }
 
-/// The motion that a unit of this dimension is of, where the type left it open.
+/// The motion whose unit has this dimension, where the type left it open.
 fn decided(
     motions: &[(MotionQuantity, Dimension)],
     dimension: Dimension,
@@ -257,7 +258,7 @@ pub(super) fn frf_scale(
     let bottom = place("denominator", denominator, stated.force.as_deref(), "force");
     let name = motion.frf_name();
     if let Some(of_force) = above.per_force {
-        // the label has the force already: one of its own must be the same
+        // the label includes the force already: a separate force unit must be the same
         let is_told = bottom.stated.is_some() || told(&denominator.unit).is_some();
         let below = if is_told { Some(bottom.unit(&[Dimension::FORCE])?) } else { None };
         if let Some(below) = below.filter(|below| !same_factor(below.factor * of_force, 1.0)) {
@@ -282,7 +283,7 @@ pub(super) fn frf_scale(
     Ok(Scale { factor: above.factor / below.factor, quantity: motion, words, note })
 }
 
-/// Refuses a denominator that is no force; says where it is not known to be one.
+/// Refuses a denominator that is not a force; returns a note where its type is unknown.
 fn is_force(denominator: &Axis, stated: &StatedUnits) -> Result<Option<String>, String> {
     match (denominator.quantity, denominator.exponents) {
         (quantity::FORCE | 9, _) => Ok(None),
@@ -297,7 +298,7 @@ fn is_force(denominator: &Axis, stated: &StatedUnits) -> Result<Option<String>, 
     }
 }
 
-/// The factor of a frequency axis to hertz, and how a person is told of it where it is not Hz.
+/// The factor from a frequency axis to Hz, and a description where it is not 1.
 pub(super) fn frequency_scale(axis: &Axis, stated: &StatedUnits) -> Result<(f64, Option<String>), String> {
     if ![quantity::FREQUENCY, quantity::UNKNOWN].contains(&axis.quantity) && stated.frequency.is_none() {
         return Err(format!(
@@ -313,7 +314,7 @@ pub(super) fn frequency_scale(axis: &Axis, stated: &StatedUnits) -> Result<(f64,
     Ok((unit.factor, (unit.factor != 1.0).then(|| format!("frequency in {label}"))))
 }
 
-/// The factor of a time axis to seconds, and how a person is told of it where it is not s.
+/// The factor from a time axis to s, and a description where it is not 1.
 pub(super) fn time_scale(axis: &Axis, stated: &StatedUnits) -> Result<(f64, Option<String>), String> {
     if ![quantity::TIME, quantity::UNKNOWN].contains(&axis.quantity) && stated.time.is_none() {
         return Err(format!("the abscissa is of type {}: 17 (time) is needed", type_name(axis.quantity)));
@@ -323,7 +324,7 @@ pub(super) fn time_scale(axis: &Axis, stated: &StatedUnits) -> Result<(f64, Opti
     Ok((unit.factor, (unit.factor != 1.0).then(|| format!("time in {}", unit.words))))
 }
 
-/// The factor of a force over time to newtons, and its unit for a person.
+/// The factor from a force over time to N, and a description of its unit.
 pub(super) fn force_scale(
     f: &Function,
     system: Option<&UnitSystem>,
@@ -354,7 +355,7 @@ pub(super) fn motion_scale(
     })
 }
 
-/// Where a function's values are, in SI, and by how much each may be off for its printed digits.
+/// A function's abscissa values in SI, and the error of each that its printed digits allow.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Places<'f> {
     abscissa: &'f Abscissa,
@@ -363,22 +364,22 @@ pub(super) struct Places<'f> {
 }
 
 impl<'f> Places<'f> {
-    /// Of a function whose abscissa has this factor to SI.
+    /// Abscissa of a function; `factor` converts it to SI.
     pub fn of(f: &'f Function, factor: f64) -> Self {
         Places { abscissa: &f.abscissa, encoding: f.encoding, factor }
     }
 
-    /// Whether two are written alike.
+    /// Whether two abscissas are written identically.
     pub fn are(&self, other: &Places<'_>) -> bool {
         (self.factor, self.encoding) == (other.factor, other.encoding) && self.abscissa == other.abscissa
     }
 
-    /// The place of value `i`.
+    /// The abscissa of value `i`.
     pub fn at(&self, i: usize) -> f64 {
         self.factor * self.abscissa.at(i)
     }
 
-    /// By how much the place of value `i` may be off.
+    /// The error bound of the abscissa of value `i`.
     pub fn error(&self, i: usize) -> f64 {
         let is_single = |number: f64| f64::from(number as f32) == number;
         let of = |number: f64| match (self.abscissa, self.encoding) {
@@ -394,11 +395,11 @@ impl<'f> Places<'f> {
     }
 }
 
-/// Rounding of a number in single precision.
+/// Relative rounding of a number in single precision.
 const SINGLE: f64 = 6e-8;
 
-/// By how much a number that was kept in single precision may be off: by this rounding, and where its digits are few
-/// enough to have been printed before, by that of the last of them.
+/// The error bound of a number stored in single precision: the rounding of that precision, and of a
+/// number with so few digits that it was printed before, also half a unit of its last digit.
 fn single_precision(number: f64) -> f64 {
     let single = number as f32;
     let digits =
@@ -411,14 +412,15 @@ fn single_precision(number: f64) -> f64 {
     rounding + printed
 }
 
-/// Digits that columns of 13 hold at least; trailing zeros among them are not seen in the number.
+/// Digits that columns of 13 hold at least; trailing zeros among them do not show in the parsed
+/// number.
 const LEAST_DIGITS: i32 = 6;
 
 /// Most digits of a number that was printed into columns of 13.
 const MOST_DIGITS: usize = 8;
 
-/// Half a unit of the last digit that a number was printed with; of one with more digits than a column
-/// of 13 holds, its own rounding.
+/// Half a unit of the last digit that a number was printed with; for a number with more digits than
+/// a column of 13 holds, the rounding of an f64.
 pub(super) fn half_of_last_digit(number: f64) -> f64 {
     if number == 0.0 || !number.is_finite() {
         return 0.0;
@@ -439,19 +441,19 @@ pub(super) fn half_of_last_digit(number: f64) -> f64 {
 pub(super) struct Sampling {
     /// Sampling rate, Hz.
     pub fs_hz: f64,
-    /// By how much the rate may be off.
+    /// Error bound of the rate, Hz.
     pub fs_error: f64,
     /// Time of the first sample, s.
     pub start_s: f64,
-    /// By how much that may be off, s.
+    /// Error bound of that time, s.
     pub start_error_s: f64,
 }
 
 impl Sampling {
-    /// Of evenly spaced samples; listed times are even where their digits allow it.
+    /// Sampling of evenly spaced samples; listed times count as even where their digits allow it.
     ///
     /// # Errors
-    /// They are not evenly spaced, or there is no rate.
+    /// The samples are not evenly spaced, or there is no valid rate.
     pub fn of(places: &Places<'_>, samples: usize) -> Result<Self, String> {
         let (start_s, start_error_s) = (places.at(0), places.error(0));
         let (step, step_error) = match places.abscissa {
@@ -479,7 +481,7 @@ impl Sampling {
         if !(rate.is_finite() && rate > 0.0 && start_s.is_finite()) {
             return Err(format!("its time step is {step} s"));
         }
-        // the largest step gives the lowest rate; a hair is added for the rounding of these sums
+        // the largest step gives the lowest rate; 1e-9 is added for the rounding of these sums
         let error = step_error * (1.0 + 1e-9);
         let (low, high) = (1.0 / (step + error), 1.0 / (step - error).max(f64::MIN_POSITIVE));
         let fs_hz = roundest(low, high).unwrap_or(rate);
@@ -487,8 +489,8 @@ impl Sampling {
     }
 }
 
-/// The whole number between two with the most zeros at its end: what a rate was before its step was
-/// printed. None where there is no whole number, or the rate is known exactly.
+/// The whole number between two bounds with the most trailing zeros: the likely rate before its
+/// step was rounded for printing. `None` where there is no whole number between the bounds.
 fn roundest(low: f64, high: f64) -> Option<f64> {
     let slack = 1e-9 * high;
     let (low, high) = (low - slack, high + slack);
@@ -606,7 +608,7 @@ mod tests {
             assert_eq!(sampled(listed(5)), Ok(rate));
             assert_eq!(sampled(listed(16)), Ok(rate));
         }
-        // no whole number within what was printed: as printed
+        // no whole number within the printed digits: the rate as printed
         for rate in [51_200.0 / 3.0, 12_800.5, 1000.0 / 7.0] {
             let found = sampled(Abscissa::Even { start: 0.0, step: 1.0 / rate }).expect("a rate");
             assert!((found / rate - 1.0).abs() < 1e-12, "{found}");

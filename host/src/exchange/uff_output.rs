@@ -1,4 +1,4 @@
-//! A campaign's FRFs and records as universal files: header, units, nodes and functions.
+//! Writes FRFs and records of a campaign as universal files: header, units, nodes and functions.
 
 use super::frf_uff::{FrfUffError, to_functions, write_uff};
 use super::uff::{
@@ -10,14 +10,14 @@ use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::substructuring::geometry::{Configuration, Point};
 use std::path::Path;
 
-/// Small, exact, and read by everybody.
+/// Compact, exact and supported by all readers.
 const ENCODING: Encoding = Encoding::Binary(ByteOrder::Little);
 
-/// Writes a configuration: its FRFs (those with values), their coherences where there are some, and its points as nodes:
-/// sensors from 1, impacts from 101.
+/// Writes a configuration: its measured FRFs, their coherences where known, and its points as
+/// nodes: sensors from 1, impacts from 101.
 ///
 /// # Errors
-/// What does not fit the format, or the disk's.
+/// The data does not fit the format, or the file cannot be written.
 pub fn write_frf(path: &Path, frf: &Frf, points: &Configuration) -> Result<(), FrfUffError> {
     let directions: Vec<i64> = frf
         .inputs()
@@ -32,7 +32,7 @@ pub fn write_frf(path: &Path, frf: &Frf, points: &Configuration) -> Result<(), F
         let (input, output) = (pair / frf.outputs().len(), pair % frf.outputs().len());
         let DataSet::Function(function) = function else { continue };
         let Values::Complex(values) = &function.values else { continue };
-        // a pair that was not measured is left out: readers take a gap for what it is
+        // pairs that were not measured are left out; readers accept gaps
         if values.iter().any(|v| !v.re.is_finite() || !v.im.is_finite()) {
             continue;
         }
@@ -52,11 +52,11 @@ pub fn write_frf(path: &Path, frf: &Frf, points: &Configuration) -> Result<(), F
     write_uff(path, &sets)
 }
 
-/// Writes the hits of a cell as time responses: force, then the responses (along x, y, z where there are three), hit after hit; the
-/// version is the hit's number.
+/// Writes the hits of a cell as time responses: the force, then the responses (along x, y, z where
+/// there are three), one hit after another; the version is the hit's number, from 1.
 ///
 /// # Errors
-/// What does not fit the format, or the disk's.
+/// The data does not fit the format, or the file cannot be written.
 pub fn write_records(
     path: &Path,
     records: &ImpactRecords,
@@ -86,11 +86,11 @@ pub fn write_records(
     write_uff(path, &sets)
 }
 
-/// Writes a level's record as time responses along z: specimen A (node 1), B (node 2), the tangential force (node 3); the version
-/// is the level's number.
+/// Writes a level's record as time responses along z: specimen A (node 1), B (node 2), the
+/// tangential force (node 3); the version is the level's number.
 ///
 /// # Errors
-/// What does not fit the format, or the disk's.
+/// The data does not fit the format, or the file cannot be written.
 pub fn write_loop(path: &Path, record: &HysteresisRecord, level: i64) -> Result<(), FrfUffError> {
     let (a, b, motion) = match &record.motion {
         RelativeMotion::Velocity { a_m_per_s, b_m_per_s } => {
@@ -113,7 +113,8 @@ pub fn write_loop(path: &Path, record: &HysteresisRecord, level: i64) -> Result<
     write_uff(path, &sets)
 }
 
-/// One signal over time: (its name, version), [response, reference], (values, sampling rate), (quantity, unit).
+/// One signal over time: (name, version), [response, reference], (values, sampling rate),
+/// (quantity, unit).
 fn time_response(
     (id, version): (&str, i64),
     [response, reference]: [Dof; 2],
@@ -159,7 +160,7 @@ fn nodes(points: &Configuration) -> Vec<Node> {
     [numbered(sensors, 1), numbered(points.impacts.iter().collect(), 101)].concat()
 }
 
-/// ±1, 2, 3 where the direction is an axis's, 0 where it is oblique.
+/// ±1, 2, 3 where the direction is along an axis, 0 where it is oblique.
 fn direction(point: &Point) -> i64 {
     (1..)
         .zip(point.direction)

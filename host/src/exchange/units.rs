@@ -1,9 +1,9 @@
-//! Units of what files from elsewhere measure: one table, and the ways in which labels write them.
+//! Units of measurements in imported files: one table, and a parser for the spellings in labels.
 //!
-//! A label is a product of symbols with powers: `mm/s`, `(mm/s)/N`, `m s^-2 N^-1`, `M/S**2`, `in/sec²`,
-//! `1/kg`. [`Unit::parse`] gives its factor to SI and its dimension; what is not in the table is an
-//! error that names the symbol. A label without a unit (`NONE`, blank, `-`) is `None` for
-//! [`told`], and means SI unless data set 164 of the file says otherwise.
+//! A label is a product of symbols with powers: `mm/s`, `(mm/s)/N`, `m s^-2 N^-1`, `M/S**2`,
+//! `in/sec²`, `1/kg`. [`Unit::parse`] returns its factor to SI and its dimension; a symbol that is
+//! not in the table is an error that names it. For a label without a unit (`NONE`, blank, `-`),
+//! [`told`] returns `None`; it means SI unless data set 164 of the file states other units.
 
 use crate::frf::MotionQuantity;
 use std::f64::consts::{PI, TAU};
@@ -17,7 +17,7 @@ const POUND: f64 = 4.448_221_615_260_5;
 /// Inch, m.
 const INCH: f64 = 0.0254;
 
-/// Exponents of length, time, force, angle and of anything electrical.
+/// Exponents of length, time, force, angle and any electrical quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimension {
     length: i8,
@@ -39,7 +39,7 @@ impl Dimension {
     pub const FORCE: Dimension = Dimension { force: 1, ..Dimension::NONE };
     /// s.
     pub const TIME: Dimension = Dimension { time: 1, ..Dimension::NONE };
-    /// Hz, as cycles in a second.
+    /// Hz, as cycles per second.
     pub const FREQUENCY: Dimension = Dimension { time: -1, ..Dimension::NONE };
     /// rad/s.
     const ANGULAR_FREQUENCY: Dimension = Dimension { time: -1, angle: 1, ..Dimension::NONE };
@@ -48,7 +48,7 @@ impl Dimension {
     const PRESSURE: Dimension = Dimension { length: -2, force: 1, ..Dimension::NONE };
     const ANGLE: Dimension = Dimension { angle: 1, ..Dimension::NONE };
 
-    /// Of a motion.
+    /// The dimension of a motion.
     pub fn of(motion: MotionQuantity) -> Dimension {
         match motion {
             MotionQuantity::Displacement => Dimension::DISPLACEMENT,
@@ -57,24 +57,24 @@ impl Dimension {
         }
     }
 
-    /// The same per newton.
+    /// This dimension per newton.
     #[must_use]
     pub const fn per_force(self) -> Dimension {
         Dimension { force: self.force - 1, ..self }
     }
 
-    /// Whether it is of something per newton.
+    /// Whether this is a quantity per newton.
     pub fn is_per_force(self) -> bool {
         self.force < 0
     }
 
-    /// The same of a rotation: rad in place of m.
+    /// This dimension for a rotation: rad instead of m.
     #[must_use]
     pub const fn rotating(self) -> Dimension {
         Dimension { length: 0, angle: self.length, ..self }
     }
 
-    /// The factor of a quantity of this dimension, from those of length and of force.
+    /// The factor of a quantity of this dimension, from the factors of length and force.
     pub fn factor(self, length: f64, force: f64) -> f64 {
         length.powi(self.length.into()) * force.powi(self.force.into())
     }
@@ -118,48 +118,48 @@ impl fmt::Display for Dimension {
     }
 }
 
-/// A unit: its factor to SI, its dimension, and how it was written.
+/// A unit: its factor to SI, its dimension and its spelling.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
-    /// What a value in this unit is multiplied by to be in SI.
+    /// Factor from this unit to SI.
     pub factor: f64,
-    /// What it is a unit of.
+    /// Its dimension.
     pub dimension: Dimension,
-    /// The part of the factor that its units of force make: of `mm/s/mN` it is 1000.
+    /// The part of `factor` that comes from units of force: 1000 for `mm/s/mN`.
     pub of_force: f64,
-    /// As the label has it.
+    /// The spelling in the label.
     pub label: String,
 }
 
-/// Why a label is no unit of what is wanted.
+/// Why a label is not a unit of the wanted dimension.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnitError {
-    /// A symbol that the table does not have.
+    /// A symbol that is not in the table.
     #[error("`{symbol}` is no unit that is known here")]
     Unknown {
         /// The symbol.
         symbol: String,
     },
-    /// Capitals that may be two units.
+    /// Capitals that may mean two units.
     #[error("`{symbol}` in capitals may be mega- or milli-")]
     Ambiguous {
         /// The symbol.
         symbol: String,
     },
-    /// No product of symbols at all.
+    /// Not a product of symbols.
     #[error("it is not written as a unit")]
     Malformed,
-    /// A unit of something else.
+    /// A unit of another dimension.
     #[error("it is {found}, and {} is wanted", wanted.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or "))]
     Dimension {
-        /// What it is a unit of.
+        /// The dimension found.
         found: Dimension,
-        /// What is wanted.
+        /// The dimensions wanted.
         wanted: Vec<Dimension>,
     },
 }
 
-/// The unit's label, where it says anything: blank, `NONE` and the like do not.
+/// The unit in a label; `None` for a label without one, such as blank or `NONE`.
 pub fn told(label: &str) -> Option<&str> {
     let label = label.trim();
     let inside = label.strip_prefix('[').and_then(|label| label.strip_suffix(']'));
@@ -169,11 +169,11 @@ pub fn told(label: &str) -> Option<&str> {
 }
 
 impl Unit {
-    /// What a label says, of one of the dimensions `wanted`. `m/s N` and `m/s*N` are read as m/(s N)
-    /// where only that is wanted.
+    /// Parses a label as a unit of one of the dimensions `wanted`. `m/s N` and `m/s*N` are read as
+    /// m/(s N) where only that has a wanted dimension.
     ///
     /// # Errors
-    /// [`UnitError`] with the symbol, or with what it is a unit of.
+    /// [`UnitError`] with the unknown symbol or with the dimension found.
     pub fn parse(label: &str, wanted: &[Dimension]) -> Result<Unit, UnitError> {
         let plain = plain(label);
         let capitals = !plain.chars().any(char::is_lowercase);
@@ -195,7 +195,7 @@ impl Unit {
         })
     }
 
-    /// What a label of a frequency axis says: hertz, or an angular frequency as hertz.
+    /// Parses the label of a frequency axis: hertz, or an angular frequency converted to hertz.
     ///
     /// # Errors
     /// [`UnitError`].
@@ -217,7 +217,7 @@ impl Unit {
     }
 }
 
-/// The label with one spelling for powers, products and prefixes.
+/// The label with one spelling of powers, products and prefixes.
 fn plain(label: &str) -> String {
     let mut out = String::with_capacity(label.len() + 4);
     let mut raised = false;
@@ -241,7 +241,7 @@ fn plain(label: &str) -> String {
     out.replace("**", "^").replace(" per ", "/").replace(" PER ", "/")
 }
 
-/// A factor to SI, its dimension, and the part of the factor that is of force.
+/// Factor to SI, dimension, and the part of the factor that comes from units of force.
 type Product = (f64, Dimension, f64);
 
 const ONE: Product = (1.0, Dimension::NONE, 1.0);
@@ -251,17 +251,17 @@ fn times(one: Product, other: Product, power: i8) -> Result<Product, UnitError> 
     Ok((one.0 * other.0.powi(power.into()), dimension, one.2 * other.2.powi(power.into())))
 }
 
-/// A label on its way through the grammar: quotients of products of powers of symbols.
+/// Parser state of a label. Grammar: quotients of products of powers of symbols.
 struct Reading<'t> {
     rest: &'t str,
-    /// Whether a product binds closer than a quotient: `m/s N` is m/(s N).
+    /// Whether a product binds more tightly than a quotient: `m/s N` is m/(s N).
     products_first: bool,
-    /// Whether the label has capitals alone.
+    /// Whether the label has no lower-case letters.
     capitals: bool,
     depth: u8,
 }
 
-/// Deepest brackets: units have one or two.
+/// Deepest nesting of brackets; units have one or two.
 const MOST_DEPTH: u8 = 8;
 
 impl Reading<'_> {
@@ -269,7 +269,7 @@ impl Reading<'_> {
         self.rest = self.rest.trim_start();
     }
 
-    /// Whether the rest begins with this letter, which is then read.
+    /// Consumes `letter` if the rest begins with it; returns whether it did.
     fn takes(&mut self, letter: char) -> bool {
         let rest = self.rest.trim_start().strip_prefix(letter);
         self.rest = rest.unwrap_or(self.rest);
@@ -293,12 +293,12 @@ impl Reading<'_> {
         self.further(own)
     }
 
-    /// What is multiplied with what came before.
+    /// Multiplies `all` by the factors that follow.
     fn further(&mut self, mut all: Product) -> Result<Product, UnitError> {
         let begins = |c: char| c.is_alphabetic() || matches!(c, '(' | '°');
         loop {
             self.skip_blanks();
-            // a sign before a digit belongs to a power, and a point to a number
+            // a sign before a digit belongs to a power, and a point before a digit to a number
             if let Some(rest) =
                 self.rest.strip_prefix(['*', '.', '-']).filter(|rest| rest.starts_with(begins))
             {
@@ -346,7 +346,7 @@ impl Reading<'_> {
         }
         let is_letter = |c: char| c.is_alphabetic() || matches!(c, '%' | '°' | '"' | '\'' | '_' | '#');
         let end = self.rest.find(|c: char| !is_letter(c)).unwrap_or(self.rest.len());
-        // symbols with a digit of their own
+        // symbols that contain a digit
         let end = if self.rest.starts_with("g0") { 2 } else { end };
         let (name, rest) = self.rest.split_at(end);
         if name.is_empty() {
@@ -358,7 +358,7 @@ impl Reading<'_> {
     }
 }
 
-/// Prefixes of SI with their factors.
+/// SI prefixes with their factors.
 const PREFIXES: [(&str, f64); 9] = [
     ("p", 1e-12),
     ("n", 1e-9),
@@ -371,11 +371,11 @@ const PREFIXES: [(&str, f64); 9] = [
     ("G", 1e9),
 ];
 
-/// The same as words.
+/// SI prefixes as words.
 const PREFIX_WORDS: [(&str, f64); 6] =
     [("nano", 1e-9), ("micro", 1e-6), ("milli", 1e-3), ("centi", 1e-2), ("kilo", 1e3), ("mega", 1e6)];
 
-/// A row of the table: names, factor to SI, dimension, and whether prefixes may be put before them.
+/// A row of the table: names, factor to SI, dimension, and whether SI prefixes are allowed.
 struct Known {
     names: &'static [&'static str],
     factor: f64,
@@ -391,8 +391,8 @@ const fn other(names: &'static [&'static str], factor: f64, dimension: Dimension
     Known { names, factor, dimension, prefixed: false }
 }
 
-/// Every unit that is known. A name counts before the same letters as a prefix and a name: `min` is a
-/// minute, `kg` a kilogram, `ft` a foot.
+/// Every known unit. A full name takes precedence over a prefix and a name: `min` is a minute, `kg`
+/// a kilogram, `ft` a foot.
 const TABLE: &[Known] = &[
     si(&["m", "metre", "meter", "metres", "meters"], Dimension::DISPLACEMENT),
     si(&["s", "sec", "secs", "second", "seconds"], Dimension::TIME),
@@ -440,7 +440,7 @@ const TABLE: &[Known] = &[
     other(&["rev", "revs", "r", "U", "cycle", "cycles", "turn"], TAU, Dimension::ANGLE),
     other(&["rpm", "cpm"], TAU / 60.0, Dimension::ANGULAR_FREQUENCY),
     other(&["cps", "rps"], TAU, Dimension::ANGULAR_FREQUENCY),
-    // two symbols without a mark between them
+    // two symbols written without a separator
     other(&["Ns"], 1.0, Dimension { time: 1, ..Dimension::FORCE }),
     other(&["Nm"], 1.0, Dimension { length: 1, ..Dimension::FORCE }),
     other(&["lbfs"], POUND, Dimension { time: 1, ..Dimension::FORCE }),
@@ -448,7 +448,7 @@ const TABLE: &[Known] = &[
 ];
 
 fn symbol(name: &str, capitals: bool) -> Result<Product, UnitError> {
-    // MN, MHZ: as capitals they may have been MN and MHz, or mN and mHz
+    // MN, MHZ: in capitals these may mean MN and MHz, or mN and mHz
     let behind_mega = name.strip_prefix('M').map(str::to_lowercase);
     if capitals && behind_mega.is_some_and(|rest| ["n", "hz", "pa", "v"].contains(&rest.as_str())) {
         return Err(UnitError::Ambiguous { symbol: name.into() });
@@ -459,7 +459,7 @@ fn symbol(name: &str, capitals: bool) -> Result<Product, UnitError> {
         .ok_or_else(|| UnitError::Unknown { symbol: name.into() })
 }
 
-/// The unit of this name, `same` deciding which names are one.
+/// The unit of this name; `same` compares names.
 fn exactly(name: &str, same: impl Fn(&str, &str) -> bool) -> Option<Product> {
     let product = |row: &Known, prefix: f64| {
         let factor = prefix * row.factor;
@@ -471,23 +471,23 @@ fn exactly(name: &str, same: impl Fn(&str, &str) -> bool) -> Option<Product> {
     }
     PREFIXES.iter().chain(&PREFIX_WORDS).find_map(|(prefix, factor)| {
         let row = named(name.strip_prefix(prefix)?).filter(|row| row.prefixed)?;
-        // a megametre, a megasecond or a giga-g is a slip of the pen
+        // a megametre, a megasecond or a giga-g is probably a spelling mistake
         let likely = *factor < 1e6
             || !matches!(row.dimension, Dimension::DISPLACEMENT | Dimension::TIME | Dimension::ACCELERATION);
         likely.then(|| product(row, *factor))
     })
 }
 
-/// Units that a person states, which count instead of what a file says: `response=mm/s,force=lbf`.
+/// Units that the user states, which override those of a file: `response=mm/s,force=lbf`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StatedUnits {
-    /// Of the motion, or of the motion per force.
+    /// Unit of the motion, or of the motion per force.
     pub response: Option<String>,
-    /// Of the force.
+    /// Unit of the force.
     pub force: Option<String>,
-    /// Of the lines of FRFs.
+    /// Unit of the frequency lines of FRFs.
     pub frequency: Option<String>,
-    /// Of the samples' times.
+    /// Unit of the sampling times.
     pub time: Option<String>,
 }
 

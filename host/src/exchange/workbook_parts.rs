@@ -1,7 +1,8 @@
-//! What a workbook says of itself, looked at before its reader believes it.
+//! Checks the claims of a workbook before its reader acts on them.
 //!
-//! A workbook is an archive of texts. Its reader makes room for as many shared texts as one attribute says, and holds what the texts
-//! inflate to: both are checked here, by inflating every part once into nothing.
+//! A workbook is an archive of texts. Its reader allocates as many shared texts as one attribute
+//! claims, and keeps the inflated texts in memory. Both are checked here by inflating every part
+//! once and discarding it.
 
 use std::io::{Cursor, Read};
 
@@ -10,21 +11,22 @@ use zip::ZipArchive;
 
 use crate::foreign::megabytes;
 
-/// Most bytes of all parts together; the paper's workbook has 70 kB.
+/// Most bytes of all inflated parts together; the paper's workbook has 70 kB.
 const MOST_BYTES: u64 = 4 << 20;
 
-/// Most parts.
+/// Most parts of a workbook.
 const MOST_PARTS: usize = 1000;
 
-/// Most bytes of a range's name that are looked at.
+/// Most bytes of a cell or range reference that are examined.
 const LONGEST_PLACE: usize = 64;
 
-/// Refuses a workbook that would take memory out of proportion.
+/// Refuses a workbook that would take disproportionate memory.
 ///
 /// # Errors
-/// Which part, and why.
+/// The part and the cause.
 pub(super) fn refuse_lies(bytes: &[u8]) -> Result<(), String> {
-    // what is no archive may be one of the old format, in which the reader would follow any chain
+    // a file that is no archive may have the old xls format, whose sector chains the reader would
+    // follow without limit
     if !bytes.starts_with(b"PK") {
         return Err("it is no .xlsx workbook (a zip archive of tables)".into());
     }
@@ -66,14 +68,15 @@ pub(super) fn refuse_lies(bytes: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// What every attribute `r` and `ref` says: cells, and the first and last one of a range.
+/// The values of every attribute `r` and `ref`: cells, and the first and last cell of a range.
 fn places(text: &[u8]) -> impl Iterator<Item = &[u8]> + '_ {
     let of = |name: &'static [u8]| {
         memmem::find_iter(text, name).filter_map(move |at| {
             let own = at.checked_sub(1).is_some_and(|before| text[before].is_ascii_whitespace());
             let behind = text[at + name.len()..].trim_ascii_start().strip_prefix(b"=")?.trim_ascii_start();
             let said = behind.strip_prefix(b"\"").or_else(|| behind.strip_prefix(b"'"))?;
-            // no further than any name of a range: whoever leaves quotes open must not have all of it read each time
+            // limited to the length of a range reference, so that an unclosed quote does not make
+            // every search scan the rest
             let said = &said[..said.len().min(LONGEST_PLACE)];
             own.then(|| &said[..memchr::memchr2(b'"', b'\'', said).unwrap_or(said.len())])
         })
@@ -81,14 +84,15 @@ fn places(text: &[u8]) -> impl Iterator<Item = &[u8]> + '_ {
     of(b"r").chain(of(b"ref")).flat_map(|said| said.split(|byte| *byte == b':'))
 }
 
-/// Whether letters and figures are more than those of the last cell, XFD1048576: its reader multiplies them as they come.
+/// Whether a reference has more letters or digits than the last cell, XFD1048576; the reader would
+/// overflow while it multiplies them up.
 fn is_no_place(cell: &[u8]) -> bool {
     let letters = cell.iter().take_while(|byte| byte.is_ascii_alphabetic()).count();
     let figures = cell[letters..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     letters > 3 || figures > 7
 }
 
-/// What every `uniqueCount` says, too large where it is no number that fits.
+/// The value of every `uniqueCount`; saturates where the number does not fit.
 fn claims(text: &[u8]) -> impl Iterator<Item = u64> + '_ {
     const NAME: &[u8] = b"uniqueCount";
     memmem::find_iter(text, NAME).map(|at| {

@@ -1,4 +1,5 @@
-//! Spectra of single hits, and the average of a cell's kept hits as it grows: one hit is read at a time, and each only once.
+//! Spectra of single hits, and the growing average of a cell's kept hits: hits are read one at a
+//! time, and each only once.
 
 use jointrig_protocol::channel::{Quantity, Role};
 use std::sync::{Mutex, PoisonError};
@@ -13,30 +14,31 @@ use crate::spectra::{
     CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,
 };
 
-/// The newest hits that are averaged. Plans ask for some ten; this bounds the time of a cell that was hit for hours.
+/// Most hits that are averaged, the newest. Plans ask for about ten; this bounds the computing time
+/// for a cell with very many hits.
 const MOST_HITS: usize = 64;
 
 /// Why a hit has no spectra.
 #[derive(Debug, thiserror::Error)]
 pub enum NoSpectra {
-    /// It is not there, or the file cannot be read.
+    /// The hit does not exist, or the file cannot be read.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// It has no pulse, or does not fit to the others.
+    /// It has no pulse, or does not match the other hits.
     #[error(transparent)]
     Spectra(#[from] SpectraError),
-    /// No force, or no response.
+    /// There is no force or no response.
     #[error("its session has no channel for the hammer's force, or none for the response")]
     NoChannel,
-    /// The response is no motion.
+    /// The response is not a motion.
     #[error("the vibrometer's channels measure no motion")]
     NoMotion,
 }
 
-/// Spectra of one hit, as that of a cell: force, and the response's channels as displacements, m.
+/// Spectra of one hit, assigned to a cell: force, and the response's channels as displacements, m.
 ///
 /// # Errors
-/// It cannot be read, or has no pulse.
+/// The record cannot be read, or has no pulse.
 pub fn of_hit(store: &Store, plan: &Plan, cell: i64, row: &RecordRow) -> Result<CrossSpectra, NoSpectra> {
     let shown = Shown::of(store, cell, row)?.ok_or(NoSpectra::NoChannel)?;
     let channels = store.channels(row.session)?;
@@ -74,11 +76,11 @@ pub fn of_hit(store: &Store, plan: &Plan, cell: i64, row: &RecordRow) -> Result<
 pub struct Average {
     /// The cell.
     pub(super) cell: i64,
-    /// The records that were asked for, the oldest first.
+    /// The requested records, the oldest first.
     pub(super) records: Vec<i64>,
-    /// Their spectra at the analysis' lines; none before the first hit that can be used.
+    /// Their spectra at the analysis' lines; `None` before the first usable hit.
     pub spectra: Option<CrossSpectra>,
-    /// What is said of records that cannot be used.
+    /// Messages about records that cannot be used.
     pub left_out: Vec<String>,
 }
 
@@ -104,7 +106,7 @@ impl Average {
     }
 }
 
-/// The average that was asked for last: the next hit of that cell is added to it.
+/// The average requested last: only the new hits of the same cell are added.
 #[derive(Debug, Default)]
 pub struct Averages {
     last: Mutex<Option<Average>>,
@@ -119,7 +121,7 @@ impl Averages {
         let kept: Vec<RecordRow> =
             store.records_for(cell)?.into_iter().flatten().filter(RecordRow::kept).collect();
         let kept = &kept[kept.len().saturating_sub(MOST_HITS)..];
-        // whoever panicked left none or a whole one
+        // valid even after a poisoned lock: it holds nothing or a complete average
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let known = last
             .take()

@@ -1,4 +1,5 @@
-//! What is said, numbered, for whoever listens: the last few messages, and the whole for a listener who missed some.
+//! Numbered messages for all listeners: the newest messages, and the complete state for a listener
+//! that missed some.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,15 +11,16 @@ use super::message::{Can, Message, Snapshot};
 use super::now::{Now, Shaker, State as Doing};
 use crate::outside::shown_json;
 
-/// Messages that are kept for a listener who is late; who is later still gets the whole.
+/// Messages that are kept for late listeners; a listener that is further behind gets the complete
+/// state.
 const KEPT: usize = 4096;
 
 /// A message as it is sent, with its number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Numbered {
-    /// Its number; each message has one more than the one before.
+    /// Its number; consecutive.
     pub seq: u64,
-    /// The message as JSON, with the number in it.
+    /// The message as JSON, including the number.
     pub text: Arc<str>,
 }
 
@@ -29,7 +31,7 @@ struct State {
     whole: Snapshot,
 }
 
-/// The one place that everything goes through.
+/// Distributes all messages.
 #[derive(Debug)]
 pub struct Bus {
     state: Mutex<State>,
@@ -43,7 +45,7 @@ impl Default for Bus {
 }
 
 impl Bus {
-    /// Of a server that can do this besides looking.
+    /// A bus for a server that supports `can`.
     pub fn new(can: Can) -> Self {
         let bus = Self::default();
         bus.inner().whole.can = can;
@@ -51,17 +53,18 @@ impl Bus {
     }
 
     fn inner(&self) -> MutexGuard<'_, State> {
-        // what a thread that panicked left is a whole number of messages
+        // valid even after a poisoned lock: it holds complete messages only
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Says something, and keeps the whole up to date.
+    /// Sends a message and updates the complete state.
     pub fn say(&self, message: Message) {
         let seq = {
             let mut state = self.inner();
             state.seq += 1;
             let numbered = match message {
-                // what the file does not know is kept, and told with it
+                // a snapshot of the file lacks the state of the measurement, so that state is kept
+                // and sent with it
                 Message::Snapshot(_) => {
                     state.whole.take_in(message);
                     numbered(state.seq, &Message::Snapshot(Box::new(state.whole.clone())))
@@ -81,7 +84,8 @@ impl Bus {
         self.newest.send_replace(seq);
     }
 
-    /// What follows the message `after`: single messages, or the whole where some of them are gone, or `after` is none.
+    /// The messages after number `after`; the complete state instead if some of them were dropped
+    /// or `after` is `None`.
     pub fn since(&self, after: Option<u64>) -> Vec<Numbered> {
         let state = self.inner();
         let first = state.recent.front().map_or(state.seq + 1, |oldest| oldest.seq);
@@ -93,33 +97,33 @@ impl Bus {
         }
     }
 
-    /// What is going on, as it was told last.
+    /// What the measuring process was last reported to be doing.
     pub fn state(&self) -> Option<Doing> {
         self.inner().whole.now.state.clone()
     }
 
-    /// The shaker's level, as it was told last.
+    /// The shaker's level as last reported.
     pub fn shaker(&self) -> Option<Shaker> {
         self.inner().whole.now.shaker.clone()
     }
 
-    /// Whether the rig is simulated, as far as the file says.
+    /// Whether the rig is simulated, according to the file.
     pub fn simulated(&self) -> bool {
         self.inner().whole.simulated
     }
 
-    /// Whether anybody listens.
+    /// Whether there is any listener.
     pub fn is_heard(&self) -> bool {
         self.newest.receiver_count() > 0
     }
 
-    /// Tells when there is something new: the number of the newest message.
+    /// A receiver of the newest message's number, which also signals new messages.
     pub fn newest(&self) -> watch::Receiver<u64> {
         self.newest.subscribe()
     }
 }
 
-/// A message with its number, as it is written.
+/// A message with its number, for serialisation.
 #[derive(Serialize)]
 struct Written<'a> {
     seq: u64,
@@ -129,12 +133,12 @@ struct Written<'a> {
 
 fn numbered(seq: u64, message: &Message) -> Numbered {
     let text = serde_json::to_string(&Written { seq, message }).unwrap_or_default();
-    // names of devices and of plans among them
+    // escaped, because it includes names from devices and plans
     Numbered { seq, text: shown_json(&text).into() }
 }
 
 impl Snapshot {
-    /// As it is after a message.
+    /// Updates the state with a message.
     fn take_in(&mut self, message: Message) {
         match message {
             Message::Snapshot(whole) => {
@@ -171,7 +175,7 @@ impl Snapshot {
 }
 
 impl Now {
-    /// As it is after a message.
+    /// Updates the state with a message.
     fn take_in(&mut self, message: Message) {
         match message {
             Message::State(state) => self.state = Some(state),
@@ -209,7 +213,7 @@ mod tests {
         let seqs = |after| bus.since(after).iter().map(|m| m.seq).collect::<Vec<_>>();
         assert_eq!(seqs(Some(1)), [2, 3]);
         assert_eq!(seqs(Some(3)), [0; 0]);
-        // a page that has just come, and one of an earlier server
+        // a page that has just connected, and one that was connected to an earlier server
         for after in [None, Some(99)] {
             let whole = bus.since(after);
             assert!(whole.len() == 1 && whole[0].text.contains("\"kind\":\"snapshot\""));
@@ -231,7 +235,7 @@ mod tests {
         let link = crate::live::now::Link { lost_scans: 7, ..Default::default() };
         bus.say(Message::Link(link));
         bus.say(Message::Snapshot(Box::new(Snapshot { file: "new".into(), ..Snapshot::default() })));
-        // told to whoever was there, and to whoever comes later
+        // for current listeners and for those that connect later
         for after in [Some(1), None] {
             let text = bus.since(after)[0].text.to_string();
             for part in ["\"file\":\"new\"", "\"lost_scans\":7", "\"edit\":true"] {

@@ -1,7 +1,9 @@
-//! The watcher of the live page: takes down what the measuring thread tells, without waiting for anything and without memory of its own.
+//! Records for the live page what the measuring thread reports, without blocking that thread and
+//! without unbounded memory.
 //!
-//! What is told goes into a queue of fixed size; when nobody empties it, the newest is left out, and the state is right again with the next
-//! one. A level's cycles go into one buffer, where the newest replaces what nobody has looked at.
+//! Reports go into a queue of fixed size; when it is full, the newest report is dropped, and the
+//! state is correct again with the next one. The cycles of a level go into a single buffer, in
+//! which new ones replace cycles that were not read.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
@@ -11,102 +13,104 @@ use crate::campaign::watch::{Seen, Watch};
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Accounts;
 
-/// Things told that nobody has heard yet.
+/// Length of the queue of reports.
 const QUEUE: usize = 256;
 
-/// Codes of a level's cycles that are looked at: a quarter of a second of sixteen channels at least. More are left out.
+/// Most codes kept of a level's cycles: at least a quarter of a second of sixteen channels. More
+/// are dropped.
 const MOST_CODES: usize = 1 << 18;
 
-/// One thing that was told.
+/// One report.
 #[derive(Clone, Debug)]
 pub enum Told {
-    /// A stream of these channels, and whether the rig is simulated.
+    /// A stream with these channels began; the flag is true for a simulated rig.
     Stream(Arc<ChannelMap>, bool),
-    /// Hammer and laser go to a cell.
+    /// Hammer and laser move to a cell.
     Moving {
         /// The cell.
         cell: i64,
-        /// Good hits that it has.
+        /// Good hits of the cell so far.
         kept: u32,
         /// The number of its next attempt.
         attempt: u32,
-        /// Whether somebody outside moves them.
+        /// Whether they are moved manually or by another program instead of by the device.
         by_hand: bool,
     },
-    /// A shot waits for rest.
+    /// A shot waits for the structure to come to rest.
     Settling {
         /// The cell.
         cell: i64,
-        /// Good hits that it has.
+        /// Good hits of the cell so far.
         kept: u32,
         /// The number of its next attempt.
         attempt: u32,
-        /// At most so long, s of the device.
+        /// Longest wait, s of device time.
         most_s: f64,
         /// Whether a person strikes.
         by_hand: bool,
     },
-    /// A record comes in.
+    /// A record is being received.
     Recording,
-    /// It is looked at.
+    /// The record is being assessed.
     Judging,
-    /// Where the scans went.
+    /// Scans received and lost.
     Link(Accounts),
-    /// A level begins.
+    /// A level of the shaker begins.
     Level {
-        /// Which.
+        /// The level.
         level: Level,
-        /// What stops the shaker, SI, channel by channel; 0 where nothing does.
+        /// Limit of each channel that stops the shaker, SI; 0 where there is none.
         limits: Vec<f64>,
-        /// The drive's largest amplitude, V.
+        /// Largest amplitude of the drive, V.
         most_drive_v: f64,
-        /// The load cells whose sum is T: place in the scan, and by what each is multiplied.
+        /// The load cells whose sum is T: index in the scan, and factor.
         load_cells: Vec<(usize, f64)>,
     },
-    /// A piece of it: time (s), amplitude, drive (V), and whether it has settled.
+    /// A window of the level: time (s), amplitude, drive (V), and whether the level has settled.
     Window([f64; 3], bool),
-    /// It is over.
+    /// The level is over: whether it was recorded, and a message.
     LevelOver(bool, String),
-    /// Measuring is over.
+    /// Measuring has ended.
     Ended,
 }
 
 /// The newest cycles of a level.
 #[derive(Debug, Default)]
 pub struct Cycles {
-    /// Codes, scan after scan.
+    /// Codes, one scan after another.
     pub codes: Vec<i16>,
-    /// Whether nobody has looked at them.
+    /// Whether they have not been read yet.
     pub fresh: bool,
 }
 
-/// The end that is told.
+/// The sending end, used by the measuring thread.
 pub struct Eye {
     queue: SyncSender<Told>,
     cycles: Arc<Mutex<Cycles>>,
 }
 
-/// The end that hears.
+/// The receiving end.
 pub struct Ear {
-    /// What was told.
+    /// The reports.
     pub queue: Receiver<Told>,
     cycles: Arc<Mutex<Cycles>>,
 }
 
-/// Both ends.
+/// Creates both ends.
 pub fn eye() -> (Eye, Ear) {
     let (to, from) = sync_channel(QUEUE);
     let cycles = Arc::new(Mutex::new(Cycles { codes: room(), fresh: false }));
     (Eye { queue: to, cycles: cycles.clone() }, Ear { queue: from, cycles })
 }
 
-/// Room for the cycles, so that the measuring thread never asks for any.
+/// A buffer for the cycles, allocated in advance so that the measuring thread never allocates.
 pub fn room() -> Vec<i16> {
     Vec::with_capacity(MOST_CODES)
 }
 
 impl Ear {
-    /// Exchanges the newest cycles for `own`, if nobody has looked at them; `own` is to come from [`room`].
+    /// Swaps the newest cycles with `own` if they have not been read yet; `own` should come from
+    /// [`room`].
     pub fn cycles(&self, own: &mut Vec<i16>) -> bool {
         let mut cycles = self.cycles.lock().unwrap_or_else(PoisonError::into_inner);
         let fresh = std::mem::take(&mut cycles.fresh);
@@ -119,7 +123,7 @@ impl Ear {
 
 impl Eye {
     fn tell(&self, told: Told) {
-        // a page that is late hears the next one
+        // if the queue is full, a later report updates the page
         let _ = self.queue.try_send(told);
     }
 
@@ -167,7 +171,7 @@ impl Watch for Eye {
             }
             Seen::LevelOver { recorded, say } => self.tell(Told::LevelOver(recorded, say.into())),
             Seen::Ended => self.tell(Told::Ended),
-            // the file says the rest
+            // the campaign file contains the rest
             Seen::Begun { .. } | Seen::Moved | Seen::Judged { .. } | Seen::Remark(_) => {}
         }
     }

@@ -1,5 +1,5 @@
-//! Figures of single records and cells, for the page that watches a campaign: a hit, its channels, all hits of a cell over one another, and where
-//! hammer and vibrometer go for it.
+//! Figures of single records and cells for the live page: a hit, its channels, all hits of a cell
+//! overlaid, and the positions of hammer and vibrometer for a cell.
 
 use jointrig_protocol::channel::{Channel, Quantity};
 
@@ -12,20 +12,20 @@ use crate::report::cell_records::{Shown, close};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Shape};
 use crate::results::Results;
 
-/// Points of an envelope: two for each pixel of a wide screen.
+/// Points of an envelope: two per pixel of a wide screen.
 const POINTS: usize = 1600;
 
 /// A hit: its force, and the response along each axis.
 ///
 /// # Errors
-/// The record is not there, or damaged.
+/// The record does not exist or is damaged.
 pub fn hit(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
     let row = store.record(record)?;
     let shown = Shown::of(store, row.cell, &row)?;
     Ok(close(&format!("Record {record}"), shown.as_slice()))
 }
 
-/// All hits of a cell over one another; damaged records are left out.
+/// All hits of a cell overlaid; damaged records are left out.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -41,7 +41,8 @@ pub fn cell(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
     Ok(close("The cell's hits", &all))
 }
 
-/// Where hammer and vibrometer go for a cell: its two places stand out of all others, which have no names.
+/// The positions of hammer and vibrometer for a cell: its two points are highlighted, all others
+/// are drawn without names.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -63,7 +64,7 @@ pub fn place(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
                 spot.role = Role::Guide;
             }
         }
-        // what stands out is drawn last
+        // highlighted points are drawn last
         scene.spots.sort_by_key(|spot| !spot.name.is_empty());
     }
     let (impact, response) = (&row.cell.impact, &row.cell.response);
@@ -77,14 +78,15 @@ pub fn place(store: &Store, cell: i64) -> Result<Option<Figure>, StoreError> {
     }))
 }
 
-/// A level of the shaker on its way: what is held against the order, the drive, and the last cycle as a loop. None before anything came.
+/// A running level of the shaker: the controlled quantity with its set point, the drive, and the
+/// last cycle as a loop. `None` before any data.
 pub fn shaker(now: &Shaker) -> Option<Figure> {
     let last = now.windows.last()?;
     let time = || Axis::linear("time", "s", [0.0, last[0].max(1.0)]).linked("level-time");
     let at = |column: usize, by: f64| -> Vec<f64> { now.windows.iter().map(|w| w[column] * by).collect() };
     let top = |values: &[f64], least: f64| 1.08 * values.iter().copied().fold(least, f64::max);
     let seconds = at(0, 1.0);
-    // of a held drive the motion has no order
+    // with a controlled drive the motion has no set point
     let ordered = now.held != "drive";
     let (quantity, unit, by) = match now.held {
         "force" => ("force", "N", 1.0),
@@ -132,10 +134,10 @@ pub fn shaker(now: &Shaker) -> Option<Figure> {
     Some(figure)
 }
 
-/// Every channel of a record as the least and the largest value of each short stretch.
+/// Every channel of a record as the smallest and largest value of each short stretch.
 ///
 /// # Errors
-/// The record is not there, or damaged.
+/// The record does not exist or is damaged.
 pub fn channels(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
     let row = store.record(record)?;
     if row.scans == 0 {
@@ -180,7 +182,7 @@ fn envelope(channel: &Channel, values: &[f64], rate_hz: f64) -> Option<Panel> {
     let x = Axis::linear("time", "s", [0.0, length_s]).linked("record-time");
     let y = Axis::linear(name, unit, [low - margin, high + margin]);
     let step = stretch as f64 / rate_hz;
-    // from the least to the largest value and on: a line through both fills what lies between
+    // alternating the smallest and largest values makes one line that fills the range between them
     let along = Along::Regular { first: 0.25 * step, step: 0.5 * step, count: 2 * ends.len() };
     let mark = Mark::line(Role::Group1, along, ends.into_iter().flatten());
     Some(Panel::new(x, y).titled(channel.name.as_str()).high(Height::Low).with(mark))

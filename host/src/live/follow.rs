@@ -1,4 +1,4 @@
-//! Sees what is new in a campaign file, whoever writes it.
+//! Detects changes of a campaign file, whichever process writes it.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,23 +14,23 @@ use crate::campaign::store::error::StoreError;
 use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_row::{Damaged, RecordRow};
 
-/// Hits from whose times the pace is told.
+/// Number of last hits from which the pace is computed.
 const PACE: usize = 40;
 
-/// An eye on a campaign file.
+/// Follows the changes of a campaign file.
 pub struct Follower {
     store: Store,
-    /// What SQLite says of the file's content: it changes with every commit of another connection.
+    /// SQLite's `data_version` of the file: it changes with every commit of another connection.
     version: i64,
-    /// Every record without its samples, as it was read last.
+    /// Every record without its samples, as last read.
     records: Vec<Result<RecordRow, Damaged>>,
-    /// Verdicts that persons had overruled by then.
+    /// Number of changed verdicts at that time.
     overruled: usize,
     seen: Snapshot,
 }
 
 impl Follower {
-    /// Opens the file and reads all of it but the samples.
+    /// Opens the file and reads everything except the samples.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -42,15 +42,15 @@ impl Follower {
         Ok(Self { store, version, records, overruled, seen })
     }
 
-    /// Everything so far.
+    /// The complete state.
     pub fn whole(&self) -> Snapshot {
         self.seen.clone()
     }
 
-    /// What is new since the last look, in order; nothing where nobody has written.
+    /// The changes since the last call, in order; empty if nothing was written.
     ///
     /// # Errors
-    /// The file cannot be read any more.
+    /// The file can no longer be read.
     pub fn look(&mut self) -> Result<Vec<Message>, StoreError> {
         let version = self.store.data_version()?;
         if version == self.version {
@@ -63,7 +63,7 @@ impl Follower {
         let overruled = self.store.overrules()?.len();
         let (new, known) = self.store.records_after(last)?;
         let messages = if overruled == self.overruled && known == self.records.len() {
-            // hours of hits stay as they were: only what came is read
+            // earlier hits are unchanged, so only the new ones are read
             let new_hits = hits(&new);
             self.records.extend(new);
             let now = all_but_hits(&self.store, &self.records)?;
@@ -81,7 +81,7 @@ impl Follower {
             let now = Snapshot { hits: hits(&self.records), ..all_but_hits(&self.store, &self.records)? };
             let before = std::mem::replace(&mut self.seen, now);
             let now = &self.seen;
-            // records that are gone are nothing that single messages could tell
+            // records that were removed cannot be expressed as single messages
             (same_campaign(&before, now) && now.hits.len() >= before.hits.len()).then(|| {
                 let last = before.hits.last().map_or(i64::MIN, |hit| hit.record);
                 let new_hits: Vec<Hit> = now.hits.iter().filter(|hit| hit.record > last).cloned().collect();
@@ -94,14 +94,15 @@ impl Follower {
     }
 }
 
-/// Whether single messages can tell what is new: no other plan was taken over, no first session began on a simulated rig, no level was
-/// added.
+/// Whether the changes can be expressed as single messages: not if the plan was replaced, if a
+/// first session began on a simulated rig, or if a level was added.
 fn same_campaign(before: &Snapshot, now: &Snapshot) -> bool {
     before.cells.iter().map(|cell| cell.id).eq(now.cells.iter().map(|cell| cell.id))
         && (before.simulated, &before.plan, &before.levels) == (now.simulated, &now.plan, &now.levels)
 }
 
-/// What leads from one state to the next, with the hits that came and those that count otherwise than before.
+/// The messages that lead from one state to the next; `new` are the hits that came, `overruled`
+/// those whose verdict changed.
 fn difference(before: &Snapshot, now: &Snapshot, new: &[Hit], overruled: Vec<Hit>) -> Vec<Message> {
     let mut messages = Vec::new();
     let mut told: Vec<i64> = Vec::new();
@@ -200,7 +201,7 @@ fn hit(record: &RecordRow) -> Hit {
     }
 }
 
-/// Time that is left at the pace of the last hits of one session; none before two good ones.
+/// Time left at the pace of the last hits of one session; `None` before two good hits.
 fn left(cells: &[CellRow], tally: &Tally, records: &[Result<RecordRow, Damaged>]) -> Option<Left> {
     let next = cells.iter().find(|row| tally.open(row.id))?;
     let session = records.iter().rev().find_map(|record| record.as_ref().ok())?.session;

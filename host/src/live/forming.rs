@@ -1,5 +1,5 @@
-//! What can be said so far: the very analysis of `jointrig analyse`, run anew on what is stored whenever there is more of it, by a process of
-//! its own beside the measuring. When the last hit is in, its numbers are those of `results.json`.
+//! Runs the analysis of `jointrig analyse` again whenever more data are stored, in a process
+//! separate from the measuring one. After the last hit its numbers are those of `results.json`.
 
 use std::io::{self, Read as _};
 use std::path::Path;
@@ -13,15 +13,17 @@ use super::found::Found;
 use super::message::Message;
 use crate::campaign::store::Store;
 
-/// The analysis rests so many times as long as it took: a sixth of one core is the most that it takes from the measuring.
+/// The analysis pauses for this many times its own duration, so that it takes at most a sixth of
+/// one core from the measurement.
 const REST: u32 = 5;
-/// The shortest rest: nobody reads faster.
+/// Shortest pause; more frequent results could not be read.
 const SHORTEST: Duration = Duration::from_secs(2);
-/// Nothing new for so long: nobody is measuring whom it could disturb.
+/// If nothing new was stored for this long, nothing is being measured that the analysis could
+/// disturb.
 const QUIET: Duration = Duration::from_secs(4);
-/// The hidden subcommand of the process that analyses.
+/// The hidden subcommand of the analysing process.
 pub const COMMAND: &str = "analyse-for-page";
-/// How often it looks whether there is more.
+/// Interval between two checks for new data.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// The newest analysis.
@@ -31,7 +33,7 @@ pub struct Formed {
 }
 
 impl Formed {
-    /// What it found.
+    /// Its results.
     pub fn found(&self) -> Arc<Found> {
         self.found.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
     }
@@ -41,7 +43,7 @@ impl Formed {
     }
 }
 
-/// Has the file analysed as long as it grows, until `stop`.
+/// Analyses the file repeatedly while it grows, until `stop`.
 pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
     let (mut known, mut seen) = (None, None);
     let (mut rest_until, mut changed) = (Instant::now(), Instant::now());
@@ -73,9 +75,9 @@ pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
     }
 }
 
-/// Has a process of this very program analyse the file.
+/// Starts this program as a separate process that analyses the file.
 fn analysed_elsewhere(path: &Path, last: i64) -> io::Result<Found> {
-    // the program as it was started, even if its file was replaced meanwhile
+    // the program that is running, even if its file was replaced meanwhile
     let itself = Path::new("/proc/self/exe");
     let program = if itself.exists() { itself.to_owned() } else { std::env::current_exe()? };
     let mut child = Command::new(program)
@@ -85,7 +87,8 @@ fn analysed_elsewhere(path: &Path, last: i64) -> io::Result<Found> {
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()?;
-    // it ends when this end of its input is closed: with this process, whatever ends that
+    // the child ends when this end of its stdin is closed, which also happens when this process
+    // dies
     let alive = child.stdin.take();
     let mut text = String::new();
     let read = child.stdout.take().map_or(Ok(0), |mut out| out.read_to_string(&mut text));
@@ -98,12 +101,13 @@ fn analysed_elsewhere(path: &Path, last: i64) -> io::Result<Found> {
     Ok(serde_json::from_str(&text)?)
 }
 
-/// The process that analyses: prints what it found of the file, and ends early when its input is closed.
+/// Main function of the analysing process: writes the results for the file as JSON, and ends early
+/// when its stdin is closed.
 ///
 /// # Errors
 /// The result cannot be written.
 pub fn analyse_for_another(path: &Path, last: i64, out: &mut impl io::Write) -> io::Result<()> {
-    // the other cores are for the measuring
+    // the other cores are for the measurement
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().map_err(io::Error::other)?;
     std::thread::Builder::new().name("wanted still".into()).spawn(|| {
         let _ = io::copy(&mut io::stdin(), &mut io::sink());
@@ -113,7 +117,7 @@ pub fn analyse_for_another(path: &Path, last: i64, out: &mut impl io::Write) -> 
     out.flush()
 }
 
-/// What an analysis depends on: other numbers, other analysis.
+/// What an analysis depends on: it is repeated when one of these changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Newest {
     records: usize,

@@ -1,5 +1,6 @@
-//! What an analysis of the campaign so far found, as far as a page asks for it. The process that analyses writes it, the one that serves reads
-//! it: what an analysis takes of memory is gone with its process, and the one that measures stays as small as it was.
+//! The results of an analysis of the campaign so far that a page needs. A separate process runs the
+//! analysis and writes them; the serving process reads them. The memory of the analysis is released
+//! with its process, so that the measuring process does not grow.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,19 +18,20 @@ use crate::report::words::brief;
 use crate::report::{self, figure_fragment};
 use crate::results::Results;
 
-/// What was found.
+/// Results of an analysis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// The estimate.
     pub estimate: Estimate,
-    /// How every cell was heard.
+    /// Data quality of each cell.
     pub cells: Vec<CellHeard>,
-    /// All figures that there are data for, by name: each as the page gets it.
+    /// All figures for which there are data, by name, as JSON for the page.
     pub figures: BTreeMap<String, String>,
 }
 
 impl Found {
-    /// Analyses a campaign file, whose newest record is `last`. An analysis that fails says why, and what is missing.
+    /// Analyses a campaign file whose newest record is `last`. If the analysis fails, the result
+    /// contains the reason and what is missing.
     pub fn of(path: &Path, last: i64) -> Self {
         let results = Store::open_read_only(path)
             .map_err(AnalyseError::from)
@@ -40,7 +42,7 @@ impl Found {
         }
     }
 
-    /// Nothing, and why.
+    /// Empty results with a reason.
     pub fn none(last: i64, why: String) -> Self {
         let estimate = Estimate { after_record: last, missing: vec![why], ..Estimate::default() };
         Found { estimate, ..Self::default() }
@@ -65,7 +67,8 @@ impl Found {
     }
 }
 
-/// A figure as the page gets it: as data, and as the drawing that stands there until the data are alive.
+/// A figure as JSON for the page: its data, and the static drawing that is shown until the page has
+/// rendered the data.
 pub fn drawn(figure: &Figure) -> String {
     shown_json(&json!({ "figure": figure, "html": figure_fragment(figure) }).to_string()).into_owned()
 }

@@ -1,8 +1,10 @@
-//! Frames of the stream for pages: the last few, numbered. Who is late finds the oldest gone.
+//! Frames of the stream for pages: the newest few, numbered. A late page skips the frames that were
+//! dropped.
 //!
-//! A frame's layout, little endian: `u8` kind (1), `u8` version (1), `u16` channels, `u32` stretches, `u64` first scan, `u32` scans of each
-//! stretch, `u32` frames that this page missed before it, `f64` ms since 1970; then for each stretch and channel the least and the largest code
-//! as `i16`. A stretch of which nothing arrived has its least code above its largest.
+//! A frame's layout, little endian: `u8` kind (1), `u8` version (1), `u16` channels, `u32`
+//! stretches, `u64` first scan, `u32` scans per stretch, `u32` frames that this page missed before
+//! it, `f64` ms since 1970; then for each stretch and channel the smallest and the largest code as
+//! `i16`. In a stretch of which nothing arrived the smallest code is greater than the largest.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,13 +14,13 @@ use tokio::sync::watch;
 
 use crate::device::tap::Envelope;
 
-/// Frames that are kept for a page that is late.
+/// Frames that are kept for late pages.
 pub const KEPT: usize = 8;
 
 /// Kind and version, the first two bytes.
 const KIND: [u8; 2] = [1, 1];
 
-/// Where the number of missed frames stands.
+/// Offset of the number of missed frames.
 const MISSED_AT: usize = 20;
 
 /// Bytes before the codes.
@@ -39,7 +41,7 @@ impl Default for Frames {
 }
 
 impl Frames {
-    /// One more frame; the oldest makes room for it.
+    /// Adds a frame; drops the oldest if necessary.
     pub fn push(&self, envelope: &Envelope, unix_ms: f64) {
         let frame: Arc<[u8]> = bytes(envelope, unix_ms).into();
         let mut ring = self.ring.lock().unwrap_or_else(PoisonError::into_inner);
@@ -50,7 +52,8 @@ impl Frames {
         self.newest.send_modify(|newest| *newest += 1);
     }
 
-    /// The first frame after number `after` that is still there: its number, and its bytes with `missed` and what was passed over in them.
+    /// The first frame after number `after` that is still kept: its number, and its bytes, in which
+    /// the number of missed frames is `missed` plus the frames skipped.
     pub fn after(&self, after: u64, missed: u32) -> Option<(u64, Vec<u8>)> {
         let ring = self.ring.lock().unwrap_or_else(PoisonError::into_inner);
         let newest = *self.newest.borrow();
@@ -62,24 +65,24 @@ impl Frames {
         Some((number, frame))
     }
 
-    /// The number of the newest frame, and when there is another.
+    /// A receiver of the newest frame's number, which also signals new frames.
     pub fn newest(&self) -> watch::Receiver<u64> {
         self.newest.subscribe()
     }
 
-    /// Whether any page looks at the stream.
+    /// Whether any page shows the stream.
     pub fn looked_at(&self) -> bool {
         self.lookers.load(Ordering::Relaxed) > 0
     }
 
-    /// A page looks as long as this lives.
+    /// Registers a page that shows the stream for as long as the returned value lives.
     pub fn look(self: &Arc<Self>) -> Looker {
         self.lookers.fetch_add(1, Ordering::Relaxed);
         Looker(self.clone())
     }
 }
 
-/// A page that looks at the stream.
+/// Registration of a page that shows the stream.
 pub struct Looker(Arc<Frames>);
 
 impl Drop for Looker {

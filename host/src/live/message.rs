@@ -1,4 +1,5 @@
-//! What a page is told, version 1. Units stand in the names; a page skips fields and kinds that it does not know.
+//! Messages to a page, version 1. Field names include units; a page ignores fields and kinds that
+//! it does not know.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,33 +13,34 @@ pub const VERSION: u32 = 1;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Message {
-    /// All that there is to know, for a page that has just come or was left behind.
+    /// The complete state, for a page that has just connected or has missed messages.
     Snapshot(Box<Snapshot>),
-    /// A record was stored and judged.
+    /// A record was stored and assessed.
     Judged(Box<Judged>),
-    /// Cells whose count changed otherwise: dropped, kept, given up, settled.
+    /// Cells whose counts changed for another reason: a hit dropped or kept, a cell given up or
+    /// settled.
     Cells(Counted),
-    /// What the analysis says by now.
+    /// The current result of the analysis.
     Estimate(Box<Estimate>),
-    /// The file cannot be read any more.
+    /// The file can no longer be read.
     Trouble(Trouble),
-    /// What is going on.
+    /// What the measuring process is doing.
     State(State),
-    /// Where the stream's scans went.
+    /// Scans received and lost.
     Link(Link),
-    /// What the stream consists of.
+    /// The channels of the stream.
     Stream(StreamInfo),
-    /// How large the signals are.
+    /// Signal levels of the channels.
     Signals(Signals),
     /// The shaker's level.
     Shaker(Box<Shaker>),
-    /// Room for the campaign file.
+    /// Free space for the campaign file.
     Disk(Disk),
-    /// Who answers for hammer and laser.
+    /// Which page may answer the prompts to move hammer and laser.
     Control(Control),
 }
 
-/// All that there is to know.
+/// The complete state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Snapshot {
     /// Version of the messages.
@@ -49,30 +51,30 @@ pub struct Snapshot {
     pub plan: String,
     /// Whether the rig is simulated.
     pub simulated: bool,
-    /// Every cell of the plan, in the order in which it is measured.
+    /// Every cell of the plan, in measuring order.
     pub cells: Vec<CellCount>,
-    /// How far it is.
+    /// Progress of the campaign.
     pub progress: Progress,
     /// Every hit, in order.
     pub hits: Vec<Hit>,
     /// Every level of the shaker that is stored.
     pub levels: Vec<LevelDone>,
-    /// What the analysis said last; none before it said anything.
+    /// The newest result of the analysis; `None` before the first.
     pub estimate: Option<Estimate>,
-    /// What is told while something is measured in this process.
+    /// State that exists only while this process measures.
     pub now: Now,
-    /// What this server can do besides looking.
+    /// What this server supports besides viewing.
     pub can: Can,
 }
 
-/// What a server can do besides looking.
+/// What a server supports besides viewing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Can {
-    /// It sees the stream of a device.
+    /// It receives a device's stream.
     pub stream: bool,
-    /// It takes notes, and overrules verdicts.
+    /// It accepts notes and changes of verdicts.
     pub edit: bool,
-    /// It lets a page answer for hammer and laser.
+    /// It lets a page answer the prompts to move hammer and laser.
     pub control: bool,
 }
 
@@ -81,36 +83,36 @@ pub struct Can {
 pub struct LevelDone {
     /// Its id.
     pub id: i64,
-    /// In words.
+    /// Its description.
     pub title: String,
-    /// `before` or `after` the hammer's cells.
+    /// `before` or `after` the hammer measurements of the cells.
     pub moment: &'static str,
-    /// What is held: `displacement`, `force` or `drive`.
+    /// The controlled quantity: `displacement`, `force` or `drive`.
     pub held: &'static str,
-    /// The order, m, N or V.
+    /// The set point, m, N or V.
     pub order: f64,
     /// The amplitude over the record, m, N or V.
     pub reached: f64,
-    /// Largest amplitude on the way, over the order.
+    /// Largest amplitude before the record, as a ratio to the set point.
     pub overshoot: f64,
-    /// Time from the order to the record, s.
+    /// Time from the set point to the record, s.
     pub after_s: f64,
-    /// The drive then, V.
+    /// Drive amplitude during the record, V.
     pub drive_v: f64,
 }
 
-/// How far a campaign is.
+/// Progress of a campaign.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Progress {
-    /// Good hits that are there.
+    /// Good hits so far.
     pub kept: u64,
     /// Good hits wanted.
     pub wanted: u64,
-    /// Whether every cell has what it wants, or enough.
+    /// Whether every cell is complete or settled.
     pub complete: bool,
-    /// The cell that comes next: its place among the cells.
+    /// Index of the next cell to measure.
     pub next: Option<usize>,
-    /// Good hits in that cell.
+    /// Time left.
     pub left: Option<Left>,
     /// Scans that the link lost for good.
     pub lost_scans: u64,
@@ -118,18 +120,18 @@ pub struct Progress {
     pub recovered_scans: u64,
 }
 
-/// Time that is left at the pace of the last hits, s.
+/// Time left at the pace of the last hits, s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Left {
-    /// In the cell.
+    /// For the cell.
     pub cell_s: f64,
-    /// In its configuration.
+    /// For its configuration.
     pub configuration_s: f64,
-    /// In the campaign.
+    /// For the campaign.
     pub campaign_s: f64,
 }
 
-/// One cell's count.
+/// Counts of one cell.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellCount {
     /// Its id in the file.
@@ -142,15 +144,15 @@ pub struct CellCount {
     pub response: String,
     /// Good hits wanted.
     pub wanted: u32,
-    /// Good hits there.
+    /// Good hits so far.
     pub kept: u32,
     /// Hits tried.
     pub attempts: u32,
     /// Refused hits by verdict.
     pub refused: BTreeMap<&'static str, u32>,
-    /// Whether it was given up, with the reason.
+    /// The reason why it was given up, if it was.
     pub given_up: Option<String>,
-    /// Whether it is done with fewer good hits than wanted, with the reason.
+    /// The reason why it is complete with fewer good hits than wanted, if it is.
     pub settled: Option<String>,
 }
 
@@ -161,36 +163,36 @@ pub struct Hit {
     pub record: i64,
     /// The cell's id.
     pub cell: i64,
-    /// Which attempt in that cell, from 0.
+    /// The attempt in that cell, from 0.
     pub attempt: u32,
-    /// When.
+    /// When it was stored, UTC.
     pub utc: String,
-    /// The verdict that counts.
+    /// The verdict in effect.
     pub verdict: &'static str,
-    /// The judge's, where a person has overruled it.
+    /// The automatic verdict, where a person has changed it.
     pub judged: Option<&'static str>,
-    /// Whether analysis uses it.
+    /// Whether the analysis uses it.
     pub kept: bool,
-    /// What was measured for the verdict; none where it is no number.
+    /// The value on which the verdict is based; `None` where it is not finite.
     pub measure: Option<f64>,
-    /// The limit it was held against.
+    /// The limit for that value.
     pub limit: Option<f64>,
-    /// Both in words.
+    /// Value and limit as a sentence.
     pub sentence: String,
     /// Peak force, N.
     pub peak_n: f64,
-    /// The coil's pulse, µs.
+    /// Length of the coil's pulse, µs.
     pub pulse_us: u32,
 }
 
-/// A hit, and what it changes.
+/// A new hit and the counts that it changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Judged {
     /// The hit.
     pub hit: Hit,
-    /// Its cell's count.
+    /// The counts of its cell.
     pub cell: CellCount,
-    /// How far the campaign is.
+    /// Progress of the campaign.
     pub progress: Progress,
 }
 
@@ -201,30 +203,30 @@ pub struct Counted {
     pub cells: Vec<CellCount>,
     /// Hits whose verdict a person changed.
     pub hits: Vec<Hit>,
-    /// How far the campaign is.
+    /// Progress of the campaign.
     pub progress: Progress,
 }
 
-/// What the analysis says.
+/// A result of the analysis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// The last record that it knows.
+    /// Id of the last record that it includes.
     pub after_record: i64,
-    /// Good hits in it.
+    /// Number of good hits that it includes.
     pub hits: usize,
-    /// How long it took, s.
+    /// Computing time, s.
     pub took_s: f64,
-    /// `answer` of `results.json`, as `analyse` gives it.
+    /// `answer` of `results.json`, as `analyse` writes it.
     pub answer: serde_json::Value,
-    /// The same in words: what it is about, and what is said of it.
+    /// The answer as text: heading and text of each line.
     pub lines: Vec<[String; 2]>,
-    /// What is missing, and for what.
+    /// What is missing, and what it is needed for.
     pub missing: Vec<String>,
-    /// Names of the figures that it has data for.
+    /// Names of the figures for which there are data.
     pub figures: Vec<String>,
 }
 
-/// Why nothing more comes.
+/// Why no more messages follow.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trouble {
     /// What is wrong, where, and what to do.

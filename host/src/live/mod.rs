@@ -1,13 +1,17 @@
-//! What can be said of a campaign while it is measured.
+//! Live view of a campaign while it is measured.
 //!
-//! What is stored is read from the campaign file, so that it is the same in the measuring process and beside it; a reader of SQLite's
-//! write-ahead log blocks no writer. [`follow`] sees what is new in the file, [`forming`] has what is there analysed and gets what was [`found`], [`figures`] draws
-//! single records, [`averaging`] and [`spectra_figures`] their spectra, [`numbers`] has a number for each cell.
+//! What is stored is read from the campaign file, so that it is the same in the measuring process
+//! and in another one; a reader of SQLite's write-ahead log does not block the writer. [`follow`]
+//! detects changes of the file, [`forming`] runs the analysis on the data so far and returns its
+//! results as [`found`], [`figures`] draws single records, [`averaging`] and [`spectra_figures`]
+//! their spectra, and [`numbers`] gives a number for each cell.
 //!
-//! What happens between two records is told by the measuring process itself: [`eye`] takes down what its thread says without ever waiting,
-//! [`watching`] hears that, looks at the stream through the tap, makes [`frames`] of it, and [`turning`] the shaker's loop.
+//! What happens between two records is reported by the measuring process: [`eye`] queues the
+//! reports of its thread without ever blocking it; [`watching`] receives them, reads the stream
+//! through the tap, makes [`frames`] of it and, with [`turning`], the shaker's loop.
 //!
-//! [`bus`] numbers what all of them have to say and keeps it for whoever listens; [`message`] and [`now`] are its layout.
+//! [`bus`] numbers the messages of all these modules and distributes them; [`message`] and [`now`]
+//! define their layout.
 
 pub mod averaging;
 pub mod bus;

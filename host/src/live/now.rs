@@ -1,82 +1,83 @@
-//! What is told while something is measured: what is going on between two records, the link, the stream's channels, the shaker's level. None of it
-//! is in the campaign file, and all of it is gone when measuring ends.
+//! State that exists only while measuring: what is done between two records, the link, the stream's
+//! channels, the shaker's level. It is not stored in the campaign file and is gone when measuring
+//! ends.
 
 use serde::Serialize;
 
 use crate::device::channels::ChannelMap;
 
-/// All of it, for a page that has just come.
+/// The whole of this state, for a page that has just connected.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Now {
-    /// What is going on.
+    /// What the measuring process is doing.
     pub state: Option<State>,
-    /// Where the stream's scans went.
+    /// Scans received and lost.
     pub link: Option<Link>,
-    /// What is measured.
+    /// The channels of the stream.
     pub stream: Option<StreamInfo>,
-    /// How large it is.
+    /// Signal levels of the channels.
     pub signals: Option<Signals>,
     /// The shaker's level.
     pub shaker: Option<Shaker>,
-    /// Room for the campaign file.
+    /// Free space for the campaign file.
     pub disk: Option<Disk>,
-    /// Who answers for hammer and laser.
+    /// Which page may answer the prompts to move hammer and laser.
     pub control: Option<Control>,
 }
 
-/// What is going on.
+/// What the measuring process is doing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct State {
-    /// In one word.
+    /// The activity.
     pub what: Doing,
-    /// Since when, ms since 1970.
+    /// Start of the activity, ms since 1970.
     pub since_unix_ms: f64,
-    /// How long it may last at most, s of the device.
+    /// Longest duration, s of device time.
     pub most_s: Option<f64>,
     /// The cell's id.
     pub cell: Option<i64>,
-    /// Good hits that the cell has.
+    /// Good hits of the cell so far.
     pub kept: u32,
     /// The number of its next attempt.
     pub attempt: u32,
 }
 
-/// What may be going on.
+/// Activities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Doing {
     /// A device moves hammer and laser.
     Moving,
-    /// Somebody outside has to.
+    /// Hammer and laser must be moved manually or by another program.
     MoveByHand,
-    /// The structure comes to rest.
+    /// Waiting for the structure to come to rest.
     Settling,
-    /// A person is to strike.
+    /// Waiting for a person to strike.
     StrikeByHand,
-    /// A hit's record comes in.
+    /// A hit's record is being received.
     Recording,
-    /// It is looked at.
+    /// The record is being assessed.
     Judging,
-    /// The shaker is on its way to a level, or holds it.
+    /// The shaker approaches a level or holds it.
     Shaking,
-    /// The channels are shown, and nothing is struck.
+    /// The channels are shown without any excitation.
     Watching,
-    /// Nothing any more.
+    /// Measuring has ended.
     Ended,
 }
 
-/// Where the stream's scans went.
+/// Scans received and lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Link {
     /// Lost for good.
     pub lost_scans: u64,
     /// Sent again.
     pub recovered_scans: u64,
-    /// Arrived at once.
+    /// Arrived when first sent.
     pub received_scans: u64,
 }
 
-/// What the stream consists of.
+/// The channels of the stream.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StreamInfo {
     /// Whether the rig is simulated.
@@ -87,19 +88,19 @@ pub struct StreamInfo {
     pub channels: Vec<ChannelInfo>,
 }
 
-/// A channel as a page needs it.
+/// What a page needs to know of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelInfo {
     /// Its name.
     pub name: String,
     /// Its SI unit.
     pub unit: &'static str,
-    /// SI units for each code.
+    /// SI units per code.
     pub units_per_code: f64,
 }
 
 impl StreamInfo {
-    /// Of these channels.
+    /// Description of a stream with these channels.
     pub fn of(channels: &ChannelMap, simulated: bool) -> Self {
         let channel = |channel: &jointrig_protocol::channel::Channel| ChannelInfo {
             name: channel.name.as_str().into(),
@@ -114,61 +115,64 @@ impl StreamInfo {
     }
 }
 
-/// How large the signals are, channel by channel.
+/// Signal levels, for each channel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Signals {
-    /// Rms about the mean over the last piece, SI.
+    /// RMS about the mean since the last report, SI.
     pub rms: Vec<f64>,
-    /// The largest magnitude of a code over it, of 32768.
+    /// Largest magnitude of a code since the last report, of 32768.
     pub peak_codes: Vec<u16>,
-    /// When the channel was at the end of its range last, ms since 1970; none if it never was.
+    /// Time at which the channel last reached the end of its range, ms since 1970; `None` if it
+    /// never did.
     pub overload_unix_ms: Vec<Option<f64>>,
-    /// Pieces of the stream of which nothing arrived.
+    /// Number of stretches of the stream of which nothing arrived.
     pub holes: u64,
 }
 
 /// The shaker's level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Shaker {
-    /// A number that each level has for itself: what came before belongs to another one.
+    /// Number of the level, different for each; older data belong to another level.
     pub level: u64,
-    /// In words.
+    /// Its description.
     pub title: String,
     /// Its (first) frequency, Hz.
     pub frequency_hz: f64,
-    /// What is held: `displacement`, `force` or `drive`.
+    /// The controlled quantity: `displacement`, `force` or `drive`.
     pub held: &'static str,
-    /// The order, m, N or V.
+    /// The set point, m, N or V.
     pub order: f64,
     /// The drive's largest amplitude, V.
     pub most_drive_v: f64,
     /// Whether it has settled.
     pub settled: bool,
-    /// How it ended: whether it was recorded, and what is to be said; none while it is on its way.
+    /// How it ended: whether it was recorded, and a message; `None` while it runs.
     pub over: Option<(bool, String)>,
-    /// Time (s of the device), amplitude of what is held (m or N; of a held drive, the relative displacement), drive (V): what is new.
+    /// New windows: time (s of the device), amplitude of the controlled quantity (m or N; with a
+    /// controlled drive the relative displacement), drive (V).
     pub windows: Vec<[f64; 3]>,
     /// The last cycle: relative displacement, µm, and force, N.
     pub turn: Option<[Vec<f64>; 2]>,
-    /// Channels that stop the shaker.
+    /// Channels whose limit stops the shaker.
     pub limits: Vec<Limit>,
 }
 
-/// What stops the shaker.
+/// A limit that stops the shaker.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Limit {
     /// The channel's name.
     pub channel: String,
     /// Its unit.
     pub unit: &'static str,
-    /// The magnitude that stops, SI.
+    /// The magnitude at which the shaker stops, SI.
     pub limit: f64,
-    /// The largest magnitude of this level so far, SI.
+    /// Largest magnitude during this level so far, SI.
     pub largest: f64,
 }
 
 impl Shaker {
-    /// As it is after what is new: windows are added, the rest is replaced.
+    /// Merges an update of the same level: windows are appended, the rest is replaced. Another
+    /// level replaces everything.
     pub fn take_in(&mut self, new: Shaker) {
         if new.level != self.level {
             *self = new;
@@ -181,16 +185,16 @@ impl Shaker {
     }
 }
 
-/// Room for the campaign file.
+/// Free space for the campaign file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Disk {
     /// Free bytes.
     pub free_bytes: u64,
 }
 
-/// Who answers for hammer and laser.
+/// Which page may answer the prompts to move hammer and laser.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Control {
-    /// The page that may answer, by the name that it gave itself.
+    /// The name of that page, which the page chose itself.
     pub page: Option<String>,
 }

@@ -1,4 +1,5 @@
-//! A number of every cell for the matrix: how hard it was hit, how far noise alone moves its FRF, how much of the response the force explains.
+//! Numbers of every cell for the matrix view: its hammer force, the random error of its FRF, and
+//! its coherence.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,12 +9,12 @@ use crate::campaign::store::record_row::{Damaged, RecordRow};
 use crate::campaign::store::rows::Rows;
 use crate::results::{Cells, MAIN_BAND};
 
-/// A cell's numbers; none where there is none yet.
+/// A cell's numbers; `None` where not known yet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellNumbers {
     /// The cell's id.
     pub cell: i64,
-    /// Mean peak of its good hits, N.
+    /// Mean peak force of its good hits, N.
     pub force_n: Option<f64>,
     /// Good hits in that mean.
     pub hits: usize,
@@ -23,7 +24,7 @@ pub struct CellNumbers {
     pub coherence: Option<f64>,
 }
 
-/// What an analysis heard of a cell.
+/// Data quality of one cell, from an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellHeard {
     configuration: String,
@@ -35,7 +36,7 @@ pub struct CellHeard {
     coherence: Option<f64>,
 }
 
-/// What the results say of every cell, in short.
+/// Extracts the data quality of every cell from the results.
 pub fn heard(found: &Cells) -> Vec<CellHeard> {
     let one = found.cells.iter().map(|cell| CellHeard {
         configuration: cell.configuration.clone(),
@@ -47,7 +48,8 @@ pub fn heard(found: &Cells) -> Vec<CellHeard> {
     one.collect()
 }
 
-/// Of every cell, in the plan's order; `found` is what the last analysis heard of them.
+/// Numbers of every cell, in the plan's order; `found` holds the data quality from the last
+/// analysis.
 pub fn of_cells(
     cells: &[CellRow],
     rows: &Rows,
@@ -74,7 +76,7 @@ pub fn of_cells(
     cells.iter().map(of_cell).collect()
 }
 
-/// The median over the main band.
+/// The median of the coherence over the main band.
 fn median(frequency_hz: &[f64], coherence: &[f64]) -> Option<f64> {
     let inside = frequency_hz.iter().zip(coherence).filter(|(f, c)| MAIN_BAND.contains(**f) && c.is_finite());
     let mut inside: Vec<f64> = inside.map(|(_, c)| *c).collect();
@@ -98,7 +100,8 @@ mod tests {
         let store = Store::create(&folder.path().join("c.jrig"), text, "plan").expect("a file");
         let cells = store.cells().expect("cells");
         assert!(cells.iter().all(|row| row.id > 0) && cells.len() > 3);
-        // the third cell was not heard; of the others, place n has the error (n + 1) ‰ and the coherence 0.9 + n/1000
+        // the third cell has no result; cell n has the error (n + 1) ‰ and the coherence 0.9 +
+        // n/1000
         let rows = cells.iter().enumerate().map(|(n, row)| results::CellRow {
             configuration: configuration_name(row.cell.configuration).into(),
             impact: row.cell.impact.clone(),

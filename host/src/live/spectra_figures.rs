@@ -1,4 +1,4 @@
-//! What the last hit excited, and the FRF of its cell as it forms.
+//! Figures of the force spectrum of the last hit and of the growing average FRF of its cell.
 
 use super::averaging::{Average, Averages, NoSpectra, of_hit};
 use crate::campaign::plan::{Cell as PlanCell, Plan};
@@ -7,25 +7,27 @@ use crate::campaign::store::error::StoreError;
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
 use crate::spectra::{CrossSpectra, usable_band};
 
-/// Lines in one value of the force's spectrum, as for the report's usable bands: noise of single lines ends no band.
+/// Lines averaged into one value of the force spectrum, as for the usable bands of the report, so
+/// that noise of single lines does not end a band.
 const FORCE_LINES: usize = 16;
-/// What bounds the band that the hammer excites, dB, by custom.
+/// Drop that bounds the excited band, dB; the customary value.
 const DROP_DB: f64 = 6.0;
-/// The force's spectrum is shown up to so many times the band: what follows is noise.
+/// The force spectrum is shown up to this multiple of the band's upper end; beyond it is noise.
 const BEYOND: f64 = 2.5;
-/// Least part of the largest magnitude that is shown: nothing below is told from noise by a 16-bit converter (96 dB).
+/// Smallest magnitude shown, relative to the largest: a 16-bit converter (96 dB) cannot distinguish
+/// smaller values from noise.
 const LOWEST: f64 = 1e-5;
 
 /// The spectrum of a hit's force, with the band in which it stays within 6 dB.
 ///
 /// # Errors
-/// The record is not there or damaged.
+/// The record does not exist or is damaged.
 pub fn force(store: &Store, record: i64) -> Result<Option<Figure>, StoreError> {
     let row = store.record(record)?;
     match of_hit(store, &store.plan()?, row.cell, &row) {
         Ok(hit) => Ok(of_force(record, &hit)),
         Err(NoSpectra::Store(error)) => Err(error),
-        // a hit without a pulse has no spectrum to show; its verdict says why
+        // a hit without a pulse has no spectrum; its verdict states the reason
         Err(_) => Ok(None),
     }
 }
@@ -40,7 +42,7 @@ fn of_force(record: i64, hit: &CrossSpectra) -> Option<Figure> {
     let frequency_hz: Vec<f64> = (0..power.len()).map(|i| first + step * i as f64).collect();
     let band = usable_band(&frequency_hz, &power, DROP_DB)?;
     let shown = frequency_hz.partition_point(|f| *f <= BEYOND * band.high_hz);
-    // |F| of a Fourier integral is N s; told as N for each Hz it is the same number
+    // the Fourier integral |F| is in N s; expressed in N/Hz it is the same number
     let size = |power: f64| 1e3 * power.sqrt();
     let top = size(power.iter().copied().fold(0.0, f64::max));
     let low = power[..shown].iter().map(|p| size(*p)).fold(top, f64::min).max(1e-3 * top);
@@ -65,7 +67,8 @@ fn of_force(record: i64, hit: &CrossSpectra) -> Option<Figure> {
     Some(Figure::new("force-spectrum", "", format!("Force of record {record}"), say).with(panel))
 }
 
-/// The FRF of a cell's newest kept hits along the hit's own direction, with ±1 σ and coherence from the second hit on.
+/// The FRF of a cell's newest kept hits along the hit's direction, with ±1 σ and coherence from the
+/// second hit on.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -78,7 +81,8 @@ pub fn frf(averages: &Averages, store: &Store, cell: i64) -> Result<Option<Figur
     Ok(of_average(&title, &average, axis))
 }
 
-/// The channel of the cell's location that feels most of the hit's direction: that along which the report tells coherence and random error.
+/// The channel of the cell's location whose axis is closest to the hit's direction; the report
+/// states coherence and random error along the same one.
 fn own_axis(plan: &Plan, cell: &PlanCell) -> usize {
     let geometry = &plan.geometry;
     let hit = geometry.impact.iter().map(toml::Spanned::get_ref).find(|p| p.name == cell.impact);
@@ -105,7 +109,7 @@ fn of_average(title: &str, average: &Average, axis: usize) -> Option<Figure> {
     let several = spectra.hits() > 1;
     let mut magnitude = Panel::new(x(), Axis::log("receptance", "m/N", [low, high]));
     if several {
-        // the deviation of the magnitude is that of the part of H1 along H1
+        // the standard deviation of the magnitude is that of H1's component along H1
         let sigma: Vec<f64> = (0..spectra.lines()).map(|line| spectra.variance(line, axis).sqrt()).collect();
         let ends = |sign: f64| size.iter().zip(&sigma).map(move |(v, s)| (v + sign * s).max(0.5 * low));
         let shape = Shape::Ribbon { x: along(), low: Packed::of(ends(-1.0)), high: Packed::of(ends(1.0)) };

@@ -4,7 +4,8 @@ use crate::report::figure::{Figure, Shape};
 use crate::spectra::{CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, estimate};
 use std::f64::consts::PI;
 
-/// One hit, 1 Hz lines: the force is a half sine of 1 ms and 50 N, the response 2 nm/N times `gain` along z, nothing elsewhere.
+/// One hit with 1 Hz lines: the force is a half sine of 1 ms and 50 N, the response 2 nm/N times
+/// `gain` along z and zero along x and y.
 fn hit(gain: f64) -> CrossSpectra {
     const RATE_HZ: usize = 51_200;
     let pulse = |i: usize| {
@@ -46,10 +47,10 @@ fn average(gains: &[f64]) -> Average {
 fn a_half_sine_of_1_ms_excites_820_hz() {
     let figure = of_force(7, &hit(1.0)).expect("a figure");
     let Shape::Shade { between } = figure.panels[0].marks[0].shape else { panic!("no band") };
-    // −6 dB of a half sine lies at 0.82 / T; a value stands for 16 lines
+    // the −6 dB point of a half sine is at 0.82 / T; one value covers 16 lines
     assert!(between[0] < 16.0 && (between[1] - 820.0).abs() < 16.0, "{between:?}");
     let force = line(&figure, 0);
-    // at low frequencies it is the pulse's area: 50 N · 1 ms · 2/π = 31.8 mN s
+    // at low frequencies the spectrum equals the pulse's area: 50 N · 1 ms · 2/π = 31.8 mN s
     assert!(force.iter().all(|v| v.is_finite()) && (force[0] - 31.8).abs() < 0.3, "{}", force[0]);
     assert!(figure.panels[0].x.range[1] < 2100.0, "what follows the band is not shown at length");
 }

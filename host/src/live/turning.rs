@@ -1,4 +1,5 @@
-//! The shaker's loop as it turns: the last cycle of what came, raw. It is made to be looked at; numbers come from what is stored.
+//! The shaker's current loop: the last received cycle, unprocessed. It is for display only; results
+//! are computed from stored data.
 
 use crate::campaign::plan::level::Level;
 use crate::campaign::run::shaking::record;
@@ -8,11 +9,11 @@ use crate::device::recording::by_channel;
 use crate::hysteresis::RelativeMotion;
 use crate::hysteresis::integration::closed_cycle;
 
-/// Points of a loop on the screen.
+/// Most points of a loop on the screen.
 const POINTS: usize = 180;
 
-/// Relative displacement (µm) and force (N) over the last whole cycle in these codes (scan after scan); none where a channel or a cycle is
-/// missing, or the frequency is being swept.
+/// Relative displacement (µm) and force (N) over the last whole cycle in these codes (one scan
+/// after another); `None` where a channel or a cycle is missing, or during a sweep.
 pub fn turn(
     channels: &ChannelMap,
     load_cells: &[(usize, f64)],
@@ -22,7 +23,7 @@ pub fn turn(
     let count = channels.len();
     let cycle = (f64::from(channels.rate_hz) / level.frequency_hz).round() as usize;
     let scans = codes.len().checked_div(count)?;
-    // shifting the channels against one another spoils the very ends
+    // the alignment of the channels in time makes both ends of the record invalid
     let spare = cycle / 8;
     if level.end_hz.is_some() || cycle < 8 || scans < cycle + 2 * spare {
         return None;
@@ -41,7 +42,7 @@ pub fn turn(
     let force = &record.force_n[within];
     let mean = force.iter().sum::<f64>() / cycle as f64;
     let step = cycle.div_ceil(POINTS);
-    // back to where it began
+    // repeats the first point, which closes the loop
     let closed = |values: &[f64], of: &dyn Fn(f64) -> f64| -> Vec<f64> {
         values.iter().step_by(step).chain(values.first()).map(|value| of(*value)).collect()
     };
@@ -76,7 +77,7 @@ mod tests {
                 channel(Role::LoadCell, Quantity::Force, 10.0),
             ],
         };
-        // x_A − x_B = 2 µm sin ωt, F = 30 N sin ωt + 5 N cos ωt on 3 N that never change
+        // x_A − x_B = 2 µm sin ωt, F = 30 N sin ωt + 5 N cos ωt plus a constant 3 N
         let level = Level { frequency_hz: 100.0, end_hz: None, held: Held::Displacement, amplitude: 2e-6 };
         let omega = TAU * 100.0;
         let code =
@@ -96,7 +97,7 @@ mod tests {
         let most = |all: &[f64]| all.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         assert!((most(&x) - 2.0).abs() < 0.02, "{}", most(&x));
         assert!((most(&force) - 30_f64.hypot(5.0)).abs() < 0.1, "{}", most(&force));
-        // where x is largest the force is the elastic part, where it is zero the rest
+        // at the largest x the force is the elastic part, at zero x the dissipative one
         let middle = x.iter().zip(&force).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).expect("points");
         assert!((middle.1.abs() - 5.0).abs() < 1.5, "{middle:?}");
         assert_eq!(turn(&channels, &[(2, 1.0)], &codes[..3 * 512], &level), None, "not a cycle and its ends");

@@ -1,5 +1,5 @@
-//! What happens between two records, on a thread of its own: hears what the watcher took down, looks at the stream through the tap, and tells
-//! both to the pages.
+//! Follows what happens between two records on a separate thread: receives the reports of the
+//! measuring thread, reads the stream through the tap, and sends both to the pages.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,33 +16,33 @@ use crate::campaign::plan::level::Level;
 use crate::device::channels::ChannelMap;
 use crate::device::tap::{Envelope, NOTHING, View};
 
-/// Time between two frames: thirty in a second.
+/// Time between two frames: 30 frames per second.
 const FRAME: Duration = Duration::from_millis(33);
 
-/// Frames between two looks at the stream while no page does.
+/// The stream is read only every this many frames while no page shows it.
 const SELDOM: u32 = 15;
 
-/// Time between two words on how large the signals are.
+/// Time between two reports of the signal levels.
 const SIGNALS: Duration = Duration::from_millis(500);
 
-/// Time between two looks at the disk.
+/// Time between two checks of the free disk space.
 const DISK: Duration = Duration::from_secs(10);
 
-/// Whoever hears and looks.
+/// The thread's inputs and outputs.
 pub struct Watching {
-    /// What the watcher took down.
+    /// Reports of the measuring thread.
     pub ear: Ear,
     /// The stream.
     pub view: View,
-    /// Who is told.
+    /// Receives the messages.
     pub bus: Arc<Bus>,
-    /// Where the stream's frames go.
+    /// Receives the frames of the stream.
     pub frames: Arc<Frames>,
-    /// The campaign file, whose disk may run full.
+    /// The campaign file, whose free disk space is reported.
     pub file: Option<PathBuf>,
 }
 
-/// What is known so far.
+/// State collected so far.
 #[derive(Default)]
 struct Known {
     channels: Option<Arc<ChannelMap>>,
@@ -55,13 +55,13 @@ struct Known {
 }
 
 impl Watching {
-    /// Tells what there is to tell, until `stop`.
+    /// Sends reports until `stop`.
     pub fn watch(mut self, stop: &AtomicBool) {
         let mut known = Known { cycles: room(), ..Known::default() };
         let (mut tick, mut signals, mut disk) = (0_u32, Instant::now(), None::<Instant>);
         loop {
             std::thread::sleep(FRAME);
-            // what was told before the end is told on
+            // reports made before `stop` was set are still sent
             let last = stop.load(Ordering::Relaxed);
             self.hear(&mut known);
             if last {
@@ -69,7 +69,7 @@ impl Watching {
             }
             tick += 1;
             if self.frames.looked_at() || tick.is_multiple_of(SELDOM) {
-                // a stream brings a stretch every millisecond; where there is none, nothing is waited for
+                // a stream delivers a stretch every millisecond; without a stream, do not wait
                 let patience = if known.channels.is_some() { FRAME } else { Duration::ZERO };
                 if let Some(envelope) = self.view.next(patience) {
                     known.signals.add(envelope);
@@ -95,7 +95,7 @@ impl Watching {
         }
     }
 
-    /// Tells what was taken down since: of everything that replaces itself, the last.
+    /// Sends the queued reports; of those that replace one another, only the last.
     fn hear(&self, known: &mut Known) {
         let (mut state, mut link) = (None, None);
         let mut shaker = false;
@@ -119,7 +119,7 @@ impl Watching {
                     let what = if by_hand { Doing::StrikeByHand } else { Doing::Settling };
                     now(what, Some(most_s), Some((cell, kept, attempt)));
                 }
-                // the cell is that of the state before
+                // the cell is that of the previous state
                 Told::Recording | Told::Judging => {
                     let what = if matches!(told, Told::Judging) { Doing::Judging } else { Doing::Recording };
                     let before = state.take().or_else(|| self.bus.state());
@@ -161,7 +161,7 @@ impl Watching {
         }
         if shaker && let Some(own) = &mut known.shaker {
             self.bus.say(Message::Shaker(Box::new(own.clone())));
-            // what was told is not told again
+            // data that were sent are not sent again
             own.windows.clear();
             own.turn = None;
         }
@@ -202,7 +202,7 @@ impl Known {
         });
     }
 
-    /// What the newest cycles say.
+    /// Updates loop and limits from the newest cycles.
     fn turn(&mut self) {
         let (Some(channels), Some(level), Some(shaker)) = (&self.channels, &self.level, &mut self.shaker)
         else {
@@ -222,7 +222,7 @@ impl Known {
     }
 }
 
-/// How large the signals were since they were told last.
+/// Signal levels since the last report.
 #[derive(Default)]
 struct Sums {
     arrived: u64,
@@ -267,7 +267,7 @@ impl Sums {
         }
     }
 
-    /// What is to be told, after which it begins anew; none where nothing arrived.
+    /// The levels to report, after which the sums are reset; `None` if nothing arrived.
     fn told(&mut self, channels: &ChannelMap) -> Option<Signals> {
         if self.arrived == 0 || channels.len() != self.both.len() {
             return None;
@@ -290,12 +290,12 @@ impl Sums {
     }
 }
 
-/// Now, ms since 1970.
+/// The current time, ms since 1970.
 fn unix_ms() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64() * 1e3)
 }
 
-/// Free bytes where this file lies; none where the system does not say.
+/// Free bytes on the file's disk; `None` where the system does not report them.
 fn free_bytes(file: &std::path::Path) -> Option<u64> {
     #[cfg(unix)]
     {

@@ -1,7 +1,8 @@
-//! Whoever sees no red, no green or no colour at all still tells a cell that is done from one that is not.
+//! Tests that people with colour vision deficiencies can distinguish finished cells from others.
 //!
-//! Deficiencies are simulated as in Machado, Oliveira and Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1; differences are
-//! Euclidean in CIE L*a*b*. Signs and texts (`5/8`, `✕`) tell the same once more.
+//! Deficiencies are simulated as in Machado, Oliveira and Fernandes, IEEE Trans. Vis. Comput.
+//! Graph. 15 (2009) 1291, severity 1; differences are Euclidean in CIE L*a*b*. Signs and texts
+//! (`5/8`, `✕`) show the same information in addition.
 
 use super::style;
 
@@ -29,7 +30,8 @@ const SEES: [(&str, [Linear; 3]); 4] = [
     ("grey", [[0.2126, 0.7152, 0.0722], [0.2126, 0.7152, 0.0722], [0.2126, 0.7152, 0.0722]]),
 ];
 
-/// The smallest difference that is seen side by side on a screen without looking for it: twice the just noticeable one of 2.3.
+/// Smallest difference that is noticed side by side on a screen without searching: twice the just
+/// noticeable difference of 2.3.
 const SEEN: f64 = 4.6;
 
 fn linear(colour: &str) -> Linear {
@@ -50,7 +52,7 @@ fn lab(rgb: Linear) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// What a variable of the style sheet is in light and in dark.
+/// The values of a variable of the style sheet in light and dark mode.
 fn colours(name: &str) -> [String; 2] {
     let head = format!("--{name}:");
     let mut all = style()
@@ -63,7 +65,7 @@ fn colours(name: &str) -> [String; 2] {
 
 #[test]
 fn cells_differ_for_every_eye_in_light_and_dark() {
-    // done, given up; begun and open differ by their text and by nothing that matters
+    // finished, given up; cells in progress and open ones need only differ by their text
     let names = ["good", "bad", "open"];
     for light in [0, 1] {
         for (eye, matrix) in SEES {
@@ -74,7 +76,8 @@ fn cells_differ_for_every_eye_in_light_and_dark() {
             let differ = |a: usize, b: usize| {
                 seen[a].iter().zip(seen[b]).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
             };
-            // without any colour, done and given up have ✕ against a number; with any, they differ at once
+            // without any colour, finished and given-up cells differ by ✕ instead of a number;
+            // otherwise their colours differ
             if eye != "grey" {
                 assert!(
                     differ(0, 1) > SEEN,

@@ -1,5 +1,6 @@
-// What a page may want changed, where its address says so: notes, keep, drop, the end after the shot in hand, the stage's answers.
-// a name of this very page: a tab that is doubled gets another one
+// Changes that a page with the address for editing may request: notes, keep, drop, stop after the
+// current shot, and answers to the prompts to move hammer and laser.
+// a random name of this page; a duplicated tab gets another one
 const me=[...crypto.getRandomValues(new Uint8Array(8))].map(b=>b.toString(16).padStart(2,'0')).join('');
 const mayEdit=()=>mine.edits&&!!state.whole?.can.edit&&state.connected;
 let undoable=null;
@@ -42,13 +43,13 @@ $('ending').addEventListener('close',async()=>{
   const told=await want('/api/stop',{});
   if(told)say(told.done);
 });
-// a hit's own buttons
+// the buttons of a hit
 function editCell(h){
   if(!mayEdit())return[];
   const button=(text,what,title)=>el('button',{type:'button',title,on:{click:()=>what==='undo'?want('/api/undo',{record:h.record}).then(t=>t&&say(t.done||t.later)):overrule(h.record,what)}},text);
   return[el('td',{className:'edits'},...(h.kept?[button('drop','drop',`leave record ${h.record} out of the analysis (D: the newest)`)]:[button('keep','keep',`take record ${h.record} into the analysis (K: the newest)`)]),...(h.judged?[' ',button('undo','undo',`the verdict before`)]:[]))];
 }
-// hammer and laser: one page at a time, and only what is asked now
+// prompts to move hammer and laser: one page at a time may answer, and only the current prompt
 let holding=false,renewal=0;
 const mayAnswer=()=>mayEdit()&&state.whole.can.control;
 async function hold(on){

@@ -1,10 +1,10 @@
-// What the server says: its messages put together into one state, and its answers to questions.
+// Communication with the server: combines its messages into one state, and sends requests.
 const $=id=>document.getElementById(id);
 const given=new URLSearchParams(location.hash.slice(1)),edits=given.has('edit');
 if(given.has('look')||edits){
   sessionStorage.setItem('token',given.get('edit')||given.get('look'));
   sessionStorage.setItem('edits',edits?'1':'');
-  // the secret stays out of the history and of what is copied from the address bar
+  // keeps the token out of the history and of addresses copied from the address bar
   history.replaceState(null,'',location.pathname);
 }
 const token=sessionStorage.getItem('token'),mine={edits:sessionStorage.getItem('edits')==='1'};
@@ -29,12 +29,12 @@ function takeIn(m){
   tell(m.kind,m);
 }
 function replace(list,item,key){const i=list.findIndex(o=>o[key]===item[key]);if(i>=0)list[i]=item}
-// what is new of a level joins what there is of it
+// merges an update of a level with its earlier data
 function joined(old,m){
   return old&&old.level===m.level?{...m,windows:old.windows.concat(m.windows),turn:m.turn||old.turn}:m;
 }
 let wait=250,open=null,wanted=false,had=0;
-// whether the stream of samples is wanted: what nobody looks at is not sent
+// requests or ends the sample stream, which is sent only while it is shown
 function wantStream(wants){
   if(wants===wanted)return;
   wanted=wants;
@@ -55,7 +55,7 @@ function connect(){
     if(!heard){heard=true;wait=250;state.connected=true;tell('link')}
     if(typeof e.data==='string'){takeIn(JSON.parse(e.data));return}
     for(const f of frames)f(new DataView(e.data));
-    // the server sends no more than three that were not answered
+    // the server sends at most three frames that were not acknowledged
     socket.send(JSON.stringify({frames:++had}));
   };
   socket.onclose=()=>{
@@ -66,7 +66,7 @@ function connect(){
     wait=Math.min(2*wait,10000);
   };
 }
-// an answer, or null where there are no data yet
+// the server's response, or null where there are no data yet
 async function ask(path){
   const answer=await fetch(path,{headers:{Authorization:'Bearer '+token}}).catch(()=>null);
   return answer?.ok?answer.json():null;

@@ -1,4 +1,4 @@
-// The strip, the verdict's banner, keys, sounds; which screen is shown.
+// The status strip, the banner of the verdict, keys, sounds, and the choice of the screen.
 root.classList.add('scripted');
 let screen=null,voice=null;
 for(const[i,s]of SCREENS.entries()){
@@ -7,7 +7,7 @@ for(const[i,s]of SCREENS.entries()){
 }
 function go(key){
   const s=SCREENS.find(s=>s.key===key);
-  // without a campaign there is the stream alone
+  // without a campaign only the stream can be shown
   if(!state.whole||!s||!state.whole.file&&s!==scopeScreen)return;
   if(screen!==s){
     // a figure belongs to the screen that shows it
@@ -20,7 +20,7 @@ function go(key){
   wantStream(s.key==='scope'&&state.whole.can.stream&&!document.hidden);
   s.show('screen');
 }
-// what is going on, in words
+// a description of the current activity
 function doing(w){
   const s=w.now.state;
   if(!s)return'';
@@ -59,9 +59,9 @@ function strip(){
   scopeScreen.button.textContent=w.can.stream?'Scope':'Channels';
 }
 const room=bytes=>bytes>=1e9?(bytes/1e9).toFixed(bytes<1e10?1:0)+' GB':(bytes/1e6).toFixed(0)+' MB';
-// time goes on between two messages
+// updates the elapsed time between two messages
 setInterval(()=>{if(!document.hidden&&state.whole?.now.state?.what==='settling')strip()},200);
-// a refused hit stays to be seen until the next good one
+// a refused hit stays visible until the next good one
 function banner(hit){
   const v=$('verdict');
   v.hidden=!hit||hit.kept;
@@ -108,7 +108,7 @@ addEventListener('keydown',e=>{
   }[e.key];
   if(act&&w){act();e.preventDefault()}
 });
-// what came while nobody looked is drawn once, not message by message
+// messages that came while the page was hidden are drawn once together
 let due=false;
 function draw(kind){
   if(due||held||document.hidden)return;
@@ -121,7 +121,7 @@ onNews((kind,message)=>{
   if(kind==='judged'){banner(message.hit);beep(message.hit)}
   if(kind==='snapshot')banner(latest());
   if(kind==='trouble'){const v=$('verdict');v.hidden=false;v.dataset.verdict='trouble';v.replaceChildren(el('b',{className:'sign','aria-hidden':'true'},'!'),el('span',{},message.what))}
-  // what the strip alone shows, and news that the screen does not, cost no drawing
+  // no drawing for messages that only the strip shows or that the current screen does not show
   const own={signals:'scope',stream:'scope',shaker:'shaker',disk:'',state:'now',control:'now',link:''}[kind];
   if(state.whole&&(own===undefined||own===screen?.key))draw(kind);
 });

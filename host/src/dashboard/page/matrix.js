@@ -1,4 +1,4 @@
-// The matrix of cells, and what its cells show: verdicts, or a number each.
+// The matrix of cells; each cell shows its verdicts or a number.
 const VIEWS=[
   {title:'verdicts',say:'Every cell: hits kept of those wanted.'},
   {title:'force',say:'Mean peak force of the good hits, N.',of:n=>n.force_n,number:v=>v.toFixed(1),text:v=>v.toFixed(1)+' N'},
@@ -48,7 +48,7 @@ const matrixScreen={key:'matrix',title:'Matrix',make(m){
     b.title=why;b.setAttribute('aria-label',why);
   }
 },async learn(){
-  // hits, verdicts and analyses change them
+  // the numbers change with hits, verdicts and analyses
   const w=state.whole,known=[w.hits.length,w.hits.filter(h=>h.kept).length,w.estimate?.after_record,w.estimate?.seq].join();
   if(this.known===known)return;
   this.known=known;

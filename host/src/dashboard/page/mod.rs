@@ -1,4 +1,5 @@
-//! What the browser gets: one page, one style sheet, one script, all of them part of the program.
+//! Content for the browser: one page, one style sheet and one script, all compiled into the
+//! program.
 
 use std::sync::LazyLock;
 
@@ -7,7 +8,7 @@ use crate::report;
 /// The page without any data.
 pub const HTML: &str = include_str!("live.html");
 
-/// In the order in which they build on one another.
+/// Scripts in the order of their dependencies.
 const SCRIPTS: [&str; 8] = [
     include_str!("link.js"),
     include_str!("picture.js"),
@@ -19,14 +20,15 @@ const SCRIPTS: [&str; 8] = [
     include_str!("live.js"),
 ];
 
-/// The report's style, and what the live page adds.
+/// The report's style sheet followed by that of the live page.
 pub fn style() -> &'static str {
     static STYLE: LazyLock<String> =
         LazyLock::new(|| format!("{}\n{}", report::chart_style(), include_str!("live.css")));
     &STYLE
 }
 
-/// The report's charts, and what the live page does with them: in a block of its own, so that no name of one means the other.
+/// The report's script followed by that of the live page, which is in a separate block so that
+/// names do not collide.
 pub fn script() -> &'static str {
     static SCRIPT: LazyLock<String> =
         LazyLock::new(|| report::script(&format!("{{\n{}}}\n", SCRIPTS.concat())));

@@ -1,10 +1,11 @@
-// The stream as it comes: least and largest value of each channel in each short stretch, the newest at the right edge.
+// The live stream: smallest and largest value of each channel in each short stretch, the newest at
+// the right edge.
 const scope={capacity:4096,length:0,next:0,first:null,end:0,missed:0,span:4,channels:0,late:[],received:0,drawn:0,pending:null};
 const NOTHING=[32767,-32768];
 function roomFor(channels){
   Object.assign(scope,{channels,length:0,next:0,first:new Float64Array(scope.capacity),scans:new Float64Array(scope.capacity),codes:new Int16Array(2*scope.capacity*channels),end:0});
 }
-// a frame, laid out as live/frames.rs says; other kinds and versions are passed over
+// a frame with the layout in live/frames.rs; other kinds and versions are ignored
 function takeFrame(v){
   if(v.byteLength<32||v.getUint8(0)!==1||v.getUint8(1)!==1)return;
   const channels=v.getUint16(2,true),stretches=v.getUint32(4,true),first=Number(v.getBigUint64(8,true)),per=v.getUint32(16,true);
@@ -29,7 +30,7 @@ function drawScope(){
   scopeDue=true;
   requestAnimationFrame(()=>{scopeDue=false;paintScope()});
 }
-// an SI value with a prefix that suits it
+// an SI value with a suitable prefix
 function inUnit(v,unit){
   if(!Number.isFinite(v))return'–';
   const a=Math.abs(v),[by,prefix]=a>=1e3?[1e-3,'k']:a>=1||a===0?[1,'']:a>=1e-3?[1e3,'m']:a>=1e-6?[1e6,'µ']:[1e9,'n'];
@@ -45,7 +46,7 @@ function paintScope(){
     if(canvas.width!==Math.round(w*ratio)||canvas.height!==Math.round(h*ratio)){canvas.width=Math.round(w*ratio);canvas.height=Math.round(h*ratio)}
     const g=canvas.getContext('2d');
     g.setTransform(ratio,0,0,ratio,0,0);g.clearRect(0,0,w,h);
-    // least and largest of each column of pixels
+    // smallest and largest value of each column of pixels
     const low=new Float64Array(w).fill(Infinity),high=new Float64Array(w).fill(-Infinity),column=n=>Math.floor((n-from)/shown*w);
     let most=16,before=null;
     const holes=[];
@@ -60,7 +61,7 @@ function paintScope(){
       for(let x=Math.max(0,column(first));x<=Math.min(w-1,Math.max(column(end)-1,column(first)));x++){low[x]=Math.min(low[x],l);high[x]=Math.max(high[x],u)}
     }
     for(const[a,b,colour]of holes){g.fillStyle=colour;g.globalAlpha=.35;g.fillRect(column(Math.max(a,from)),0,Math.max(1,column(b)-column(Math.max(a,from))),h);g.globalAlpha=1}
-    // up with the signal at once, down only when it has halved twice
+    // the scale grows with the signal immediately; it shrinks only above four times the peak
     if(!(row.scale>=most)||row.scale>4*most)row.scale=Math.min(32768,1.25*most);
     const factor=stream.channels[c].units_per_code,up=Math.sign(factor)||1,y=code=>h/2-up*code/row.scale*(h/2-2);
     g.strokeStyle=grid;g.beginPath();g.moveTo(0,h/2);g.lineTo(w,h/2);g.stroke();

@@ -1,11 +1,11 @@
-// The screens: each makes its elements once, and brings them up to date when there is news.
+// The screens: each creates its elements once and updates them when messages arrive.
 function el(tag,options={},...children){
   const e=document.createElement(tag);
   for(const[k,v]of Object.entries(options))if(k==='on')for(const[type,f]of Object.entries(v))e.addEventListener(type,f);else if(k in e)e[k]=v;else e.setAttribute(k,v);
   e.append(...children);
   return e;
 }
-// one for each verdict, so that no colour is needed to tell them
+// a sign for each verdict, so that they can be distinguished without colour
 const SIGNS={good:'✓','double hit':'≡',overload:'⊓',noisy:'~',weak:'↓',strong:'↑',mistimed:'⇄',gap:'…',dropped:'–'};
 const signOf=v=>SIGNS[v]||'✕';
 const fixed=(v,n)=>v===null||v===undefined?'–':v.toFixed(n);
@@ -13,8 +13,8 @@ function duration(s){
   s=Math.round(s);
   return s<100?s+' s':s<6000?Math.round(s/60)+' min':Math.floor(s/3600)+' h '+Math.floor(s%3600/60)+' min';
 }
-let chosen=null;     // the cell that is looked at; null follows the newest hit
-let held=false;      // the picture stands still
+let chosen=null;     // the cell that is shown; null follows the newest hit
+let held=false;      // the picture is frozen
 const latest=()=>state.whole.hits.at(-1)||null;
 const looked=()=>chosen??latest()?.cell??state.whole.cells[0]?.id;
 const hitsOf=cell=>state.whole.hits.filter(h=>h.cell===cell);
@@ -49,7 +49,7 @@ const SCREENS=[
     if(h){
       picture(this.hit,`/api/records/${h.record}/hit`);
       picture(this.force,`/api/records/${h.record}/force`);
-      // it changes with every hit that is kept or dropped
+      // the address changes with every hit that is kept or dropped
       picture(this.frf,`/api/cells/${h.cell}/frf?${hitsOf(h.cell).filter(o=>o.kept).map(o=>o.record).join('.')}`);
     }
     this.answer.replaceChildren(...said(w.estimate));
@@ -86,7 +86,7 @@ const SCREENS=[
     const put=(utc,text,refused)=>{
       const when=utc.slice(0,19).replace('T',' '),row=el('tr',{className:refused?'refused':''},el('td',{},when),el('td',{className:'why'},text));
       row.when=utc;
-      // the newest stands above
+      // newest first
       const below=[...this.rows.rows].find(r=>r.when<=utc);
       this.rows.insertBefore(row,below||null);
     };

@@ -1,4 +1,4 @@
-// The shaker: the level on its way, what stops it, and the levels that are stored.
+// The shaker: the running level, the limits that stop it, and the stored levels.
 const amountOf=(held,v)=>v===null||v===undefined?'–':held==='displacement'?(v*1e6).toPrecision(4)+' µm':held==='force'?v.toPrecision(4)+' N':v.toPrecision(4)+' V';
 const shakerScreen={key:'shaker',title:'Shaker',make(m){
   this.head=m.appendChild(el('p',{className:'next',id:'level'}));
@@ -15,7 +15,7 @@ const shakerScreen={key:'shaker',title:'Shaker',make(m){
   if(s){
     const last=s.windows.at(-1);
     this.head.textContent=s.title+': '+(s.over?s.over[0]?'✓ recorded':'✕ not recorded':s.settled?'✓ settled, recording':'∿ on its way');
-    // of a held drive the motion has no order
+    // with a controlled drive the motion has no set point
     const measured=s.held==='drive'?'displacement':s.held;
     this.note.textContent=s.over?s.over[1]:last?`${amountOf(measured,last[1])}${s.held==='drive'?'':` of ${amountOf(s.held,s.order)} ordered (${(100*last[1]/s.order).toFixed(1)} %)`}, drive ${last[2].toPrecision(3)} V of at most ${s.most_drive_v.toPrecision(3)} V, after ${last[0].toFixed(1)} s`:'The order is given.';
     this.note.className=s.over&&!s.over[0]?'refused':'say';

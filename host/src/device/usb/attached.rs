@@ -1,9 +1,9 @@
-//! Which controllers are attached, and which of them is meant.
+//! Lists the attached controllers and selects one of them.
 
 use jointrig_protocol::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use nusb::{DeviceInfo, MaybeFuture};
 
-/// A controller on a bus of this machine. Nothing was opened to find it.
+/// A controller attached to this computer. It was found without opening it.
 pub struct Attached {
     /// Its serial number, when the system knows it.
     pub serial: Option<String>,
@@ -11,16 +11,16 @@ pub struct Attached {
 }
 
 impl Attached {
-    /// The address that names it.
+    /// Its address.
     pub fn address(&self) -> String {
         format!("usb:{}", self.serial.as_deref().unwrap_or_default())
     }
 }
 
-/// Every controller that is attached.
+/// Lists all attached controllers.
 ///
 /// # Errors
-/// The system does not list its USB devices.
+/// The system cannot list its USB devices.
 pub fn attached() -> Result<Vec<Attached>, nusb::Error> {
     let devices = nusb::list_devices().wait()?;
     let ours = devices
@@ -28,12 +28,13 @@ pub fn attached() -> Result<Vec<Attached>, nusb::Error> {
     Ok(ours.map(|info| Attached { serial: info.serial_number().map(Into::into), info }).collect())
 }
 
-/// The ids are a test id, which may be anybody's: the product's name decides where the system knows it.
+/// Vendor and product ids are test ids that other devices may share, so the product name decides
+/// where the system knows it.
 fn is_controller(vendor: u16, product: u16, name: Option<&str>) -> bool {
     (vendor, product) == (VENDOR_ID, PRODUCT_ID) && name.is_none_or(|name| name == PRODUCT)
 }
 
-/// Place in the list of the controller with the serial number `wanted`, or of the only one.
+/// Index of the controller with the serial number `wanted`, or of the only one.
 pub(super) fn choose(list: &[Attached], wanted: Option<&str>) -> Result<usize, String> {
     let serials: Vec<_> = list.iter().map(|one| one.serial.as_deref()).collect();
     choose_serial(&serials, wanted)

@@ -1,7 +1,9 @@
-//! `usb:` and `usb:SERIAL`: the controller's vendor interface, two bulk endpoints that carry frames.
+//! `usb:` and `usb:SERIAL`: the controller's vendor interface, two bulk endpoints that carry
+//! frames.
 //!
-//! Nothing but a name chooses this way over the serial port: the controller answers on the interface on which
-//! it was last spoken to. [`attached`] looks, [`Usb::open`] opens, and transfers are kept waiting for bytes.
+//! Only the address selects this interface instead of the serial port; the controller answers on
+//! the interface on which it last received a message. [`attached`] lists controllers, [`Usb::open`]
+//! opens one, and transfers stay queued for its bytes.
 
 mod attached;
 mod queue;
@@ -19,17 +21,17 @@ use super::transport::Transport;
 pub use attached::{Attached, attached};
 use queue::{Incoming, Queue, TRANSFER_BYTES, broken};
 
-/// How long a write may wait for a controller that does not take bytes.
+/// Longest wait of a write for a controller that accepts no bytes.
 const WRITE_PATIENCE: Duration = Duration::from_secs(5);
 
-/// An open vendor interface. Dropping it cancels what is queued and gives the interface back.
+/// An open vendor interface. Dropping it cancels queued transfers and releases the interface.
 pub struct Usb {
     queue: Queue<BulkIn>,
     out: Endpoint<Bulk, Out>,
 }
 
 impl Usb {
-    /// Opens the controller with this serial number, or the only one that is attached.
+    /// Opens the controller with this serial number, or the only one attached.
     ///
     /// # Errors
     /// [`DeviceError::Open`]: none or several attached, no permission, held by another program.
@@ -48,7 +50,7 @@ impl Usb {
     }
 }
 
-/// Where the frames go: numbers from the controller's own descriptors.
+/// Interface and endpoint numbers, from the controller's descriptors.
 struct Ends {
     interface: u8,
     out: u8,
@@ -82,7 +84,7 @@ impl Ends {
     }
 }
 
-/// The words for a controller that could not be opened.
+/// A message for a controller that could not be opened.
 fn why(error: &nusb::Error) -> String {
     match error.kind() {
         ErrorKind::PermissionDenied => format!("permission denied: {INSTALL_UDEV_RULE}"),
@@ -98,7 +100,7 @@ fn why(error: &nusb::Error) -> String {
     }
 }
 
-/// The bulk endpoint towards the host, its buffers used again and again.
+/// The bulk IN endpoint; its buffers are reused.
 struct BulkIn {
     end: Endpoint<Bulk, In>,
     idle: Vec<Buffer>,
@@ -136,7 +138,8 @@ impl Transport for Usb {
     }
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // a zero ends every frame, so that no empty packet has to end a transfer of whole packets
+        // a zero byte ends every frame, so no zero-length packet is needed after a transfer of
+        // whole packets
         match self.out.transfer_blocking(bytes.to_vec().into(), WRITE_PATIENCE).status {
             Err(TransferError::Cancelled) => Err(io::Error::new(
                 io::ErrorKind::TimedOut,

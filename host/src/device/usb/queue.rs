@@ -1,36 +1,37 @@
-//! Transfers that wait for the controller's bytes, so that the controller never waits for this program.
+//! Queued transfers for the controller's bytes, so that the controller never waits for this
+//! program.
 //!
 //! At high speed each frame is a short packet and ends a transfer: 16 channels at 51.2 kHz are 3400
-//! transfers a second, 1.7 MB/s. As many stay queued as hold [`TRANSFERS`] frames, some 37 ms; a host that is
-//! held up for longer is waited for by the controller's ring.
+//! transfers per second, 1.7 MB/s. [`TRANSFERS`] transfers stay queued, enough for about 37 ms; the
+//! controller's ring covers longer delays of the host.
 
 use std::io;
 use std::time::Duration;
 
 use nusb::transfer::TransferError;
 
-/// Bytes that one transfer takes: whole packets at either speed, and one whole frame.
+/// Bytes of one transfer: whole packets at either speed, and one whole frame.
 pub(super) const TRANSFER_BYTES: usize = 512;
 
 /// Transfers queued at any time.
 const TRANSFERS: usize = 128;
 
-/// A bulk endpoint towards the host.
+/// A bulk IN endpoint.
 pub(super) trait Incoming: Send {
-    /// Queues one more transfer of [`TRANSFER_BYTES`].
+    /// Queues another transfer of [`TRANSFER_BYTES`].
     fn ask(&mut self);
 
-    /// Waits at most `timeout` for the oldest queued transfer, and appends what it brought, whatever became
-    /// of it; `None` when it has not finished.
+    /// Waits at most `timeout` for the oldest queued transfer and appends its bytes, even if it
+    /// failed; `None` when it has not finished.
     fn finished(&mut self, timeout: Duration, bytes: &mut Vec<u8>) -> Option<Result<(), TransferError>>;
 }
 
-/// A stream of bytes made of transfers.
+/// A byte stream made of transfers.
 pub(super) struct Queue<I> {
     end: I,
     queued: usize,
     bytes: Vec<u8>,
-    /// How many of the bytes were handed over.
+    /// Number of bytes already returned.
     taken: usize,
     failed: Option<TransferError>,
 }
@@ -42,11 +43,12 @@ impl<I: Incoming> Queue<I> {
         queue
     }
 
-    /// What is there, as [`super::Transport::read`] gives it. A failure comes after the last byte before it.
+    /// Reads the available bytes as [`super::Transport::read`] does. A failure is reported after
+    /// the bytes before it.
     pub fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let mut patience = timeout;
         while self.bytes.len() - self.taken < buf.len() && self.failed.is_none() && self.collect(patience) {
-            // only the first byte is waited for; an empty transfer is none
+            // wait only for the first byte; an empty transfer has none
             if self.bytes.len() > self.taken {
                 patience = Duration::ZERO;
             }
@@ -67,7 +69,7 @@ impl<I: Incoming> Queue<I> {
         Ok(used)
     }
 
-    /// Takes one finished transfer and queues another in its place; whether there was one.
+    /// Takes one finished transfer and queues another one; returns whether there was one.
     fn collect(&mut self, timeout: Duration) -> bool {
         let Some(status) = self.end.finished(timeout, &mut self.bytes) else { return false };
         self.queued -= 1;
@@ -86,14 +88,15 @@ impl<I: Incoming> Queue<I> {
     }
 }
 
-/// A transfer's failure in the words of whoever stands at the rig.
+/// Converts a transfer's failure to an error worded for the operator.
 pub(super) fn broken(error: TransferError) -> io::Error {
     match error {
         TransferError::Disconnected => io::Error::new(
             io::ErrorKind::NotConnected,
             "the controller is gone from the bus: unplugged, without power, or restarting",
         ),
-        // a cable being pulled shows as this for a moment before the bus notices
+        // while a cable is pulled this error occurs briefly before the bus reports the
+        // disconnection
         TransferError::Fault => io::Error::new(
             io::ErrorKind::ConnectionAborted,
             "the bus does not reach the controller: unplugged, or a bad cable or hub",
@@ -116,7 +119,7 @@ mod tests {
     use jointrig_protocol::packet::Reader;
     use proptest::prelude::*;
 
-    /// An endpoint that brings what it was given, one transfer after another, and then nothing.
+    /// An endpoint that delivers the given transfers one after another, and then nothing.
     #[derive(Default)]
     struct Script {
         transfers: VecDeque<(Vec<u8>, Result<(), TransferError>)>,
@@ -187,7 +190,7 @@ mod tests {
     }
 
     proptest! {
-        /// Transfers of any lengths, read in portions of any size, are the same frames.
+        /// Transfers of any lengths, read in pieces of any size, give the same frames.
         #[test]
         fn frames_survive_any_split(
             lengths in prop::collection::vec(0..=TRANSFER_BYTES, 1..40),
