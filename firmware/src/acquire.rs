@@ -1,8 +1,8 @@
 //! Acquisition: blocks of scans from the converters, through the hammer's machine, into the ring.
 //!
-//! One block is 15 scans of 16 channels, 293 µs at 51.2 kHz: that is the time this task has for each. What
-//! it does with a block is bounded and done under one lock; the orders for coil and drive that come of it
-//! are carried out right after.
+//! One block is 15 scans of 16 channels, 293 µs at 51.2 kHz: that is the time this task has for
+//! each. What it does with a block is bounded and done under one lock; the orders for coil and
+//! drive that come of it are carried out right after.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::Instant;
@@ -17,8 +17,9 @@ use crate::hammer::{CoilOrder, Scanned};
 use crate::ring::Range;
 use crate::state::State;
 
-/// Blocks for which the link is woken: a wake-up costs a tenth of what a block does, and nothing is in such haste. What is left over
-/// goes with the next look of [`crate::watch`], a tenth of a second later.
+/// Blocks for which the link is woken: a wake-up costs a tenth of what a block does, and nothing is
+/// in such haste. What is left over goes with the next look of [`crate::watch`], a tenth of a
+/// second later.
 const BLOCKS_PER_WAKE: u64 = 4;
 
 /// Runs for ever.
@@ -115,8 +116,8 @@ impl Scanned for InHand<'_> {
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// A front end that can be held waits here: without a stream, and half a ring ahead of the host. False when the board has
-    /// something to do for clock or sync output first.
+    /// A front end that can be held waits here: without a stream, and half a ring ahead of the
+    /// host. False when the board has something to do for clock or sync output first.
     async fn wait_until_it_may_run(&self) -> bool {
         loop {
             let (runs, due) = self.with(|state| {
@@ -136,8 +137,9 @@ impl<M: RawMutex> Core<'_, M> {
         }
     }
 
-    /// Interlock and emergency stop, once a block. The hardware acts on both by itself; this is how the
-    /// machine learns of it. A board whose inputs interrupt tells sooner ([`Core::see_inputs`]).
+    /// Interlock and emergency stop, once a block. The hardware acts on both by itself; this is how
+    /// the machine learns of it. A board whose inputs interrupt tells sooner
+    /// ([`Core::see_inputs`]).
     fn watch_inputs(&self, inputs: &mut impl Inputs) {
         let closed = inputs.interlock_closed();
         let pressed = inputs.emergency_stop();
@@ -179,7 +181,8 @@ impl<M: RawMutex> Core<'_, M> {
 }
 
 impl State<'_> {
-    /// Takes a block that was delivered after so many were missed; `pairs` are its codes, whole scans.
+    /// Takes a block that was delivered after so many were missed; `pairs` are its codes, whole
+    /// scans.
     fn take(
         &mut self,
         delivered: Delivered,

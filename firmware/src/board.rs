@@ -1,8 +1,9 @@
-//! What a board must bring: scans, a coil, a drive, two inputs, bytes in, bytes out, and perhaps a stage.
+//! What a board must bring: scans, a coil, a drive, two inputs, bytes in, bytes out, and perhaps a
+//! stage.
 //!
-//! The contract is small on purpose. Everything that can be decided above it is decided above it, where
-//! a PC can test it; what stands here is what only hardware can do. A board groups its parts under
-//! [`Board`] so that one name says them all, and hands each part to the task that uses it.
+//! The contract is small on purpose. Everything that can be decided above it is decided above it,
+//! where a PC can test it; what stands here is what only hardware can do. A board groups its parts
+//! under [`Board`] so that one name says them all, and hands each part to the task that uses it.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::answer::Refusal;
@@ -42,35 +43,40 @@ pub struct Delivered {
     pub scans: u8,
     /// Scans that were lost between the last block and this one.
     pub missed: u32,
-    /// Whether any code may be beyond half of the converters' range; if not, none is looked at for its end.
+    /// Whether any code may be beyond half of the converters' range; if not, none is looked at for
+    /// its end.
     pub loud: bool,
 }
 
 /// The converters, sampling all channels on one edge of a hardware timer.
 pub trait Scans {
-    /// Whether the clock of the scans can be held (a simulated front end). It then never runs more than
-    /// half a ring ahead of the host's acknowledgement, so that nothing depends on the host's speed.
+    /// Whether the clock of the scans can be held (a simulated front end). It then never runs more
+    /// than half a ring ahead of the host's acknowledgement, so that nothing depends on the host's
+    /// speed.
     fn can_be_held(&self) -> bool {
         false
     }
 
-    /// Waits for the next block and writes it: scan by scan, channel by channel, little-endian 16 bit.
+    /// Waits for the next block and writes it: scan by scan, channel by channel, little-endian 16
+    /// bit.
     ///
-    /// The sampling instants are the timer's; being late here costs buffer space, never punctuality.
+    /// The sampling instants are the timer's; being late here costs buffer space, never
+    /// punctuality.
     fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> impl Future<Output = Delivered>;
 
     /// Counts of the board's own crystal in a nominal scan, of which [`Seen::span`] speaks.
     const PERIOD: u32 = 1;
 
-    /// What sync input and external clock have done since this was asked last; asked after each block. Asking also ends a pulse of
-    /// the sync output.
+    /// What sync input and external clock have done since this was asked last; asked after each
+    /// block. Asking also ends a pulse of the sync output.
     #[inline]
     fn seen(&mut self) -> Option<Seen> {
         None
     }
 
-    /// Lets this time the scans from now on. The count of scans goes on, and so do the scans when the clock fails: by the board's own
-    /// crystal, a little slower, so that the failure shows in [`Seen::span`].
+    /// Lets this time the scans from now on. The count of scans goes on, and so do the scans when
+    /// the clock fails: by the board's own crystal, a little slower, so that the failure shows in
+    /// [`Seen::span`].
     ///
     /// # Errors
     /// Nothing that could be a clock comes to the input; the board's own goes on.
@@ -81,7 +87,8 @@ pub trait Scans {
         }
     }
 
-    /// Raises the sync output, until [`Scans::seen`] is asked next; when that was. None on a board without one.
+    /// Raises the sync output, until [`Scans::seen`] is asked next; when that was. None on a board
+    /// without one.
     fn mark(&mut self) -> Option<Ago> {
         None
     }
@@ -103,8 +110,8 @@ pub trait Coil {
     /// Longest pulse, µs: the hardware ends any pulse by then, whatever the software does.
     fn cap_us(&self) -> u32;
 
-    /// Energises the coil once, from the next scan on, for `width_us` (already checked against the cap).
-    /// The end of the pulse must be the hardware's doing.
+    /// Energises the coil once, from the next scan on, for `width_us` (already checked against the
+    /// cap). The end of the pulse must be the hardware's doing.
     fn pulse(&mut self, width_us: u32);
 
     /// De-energises the coil at once.
@@ -116,14 +123,15 @@ pub trait Drive {
     /// Output at the largest code, V; 0 when the board drives no shaker.
     fn full_scale_v(&self) -> f32;
 
-    /// Takes the codes of as many scans as the block that was just delivered had. They are played without
-    /// a gap after those given before; what follows the last code given is rest (0 V).
+    /// Takes the codes of as many scans as the block that was just delivered had. They are played
+    /// without a gap after those given before; what follows the last code given is rest (0 V).
     ///
-    /// No codes at all say that a motion ends here: what was given is still played, and the next codes
-    /// begin another one, whenever they come.
+    /// No codes at all say that a motion ends here: what was given is still played, and the next
+    /// codes begin another one, whenever they come.
     ///
     /// # Errors
-    /// [`RanDry`] when the converter has already passed the end of what was given before: it rests, and took nothing.
+    /// [`RanDry`] when the converter has already passed the end of what was given before: it rests,
+    /// and took nothing.
     fn play(&mut self, codes: &[i16]) -> Result<(), RanDry>;
 
     /// To rest at once, whatever was given before.
@@ -163,8 +171,9 @@ pub trait Inputs {
     fn fault(&mut self) -> Option<&'static str> {
         None
     }
-    /// The specimen's temperature and the bias of sensors that are fed with a constant current, when they were measured since this was
-    /// asked last: some ten times a second. None on a board that has neither.
+    /// The specimen's temperature and the bias of sensors that are fed with a constant current,
+    /// when they were measured since this was asked last: some ten times a second. None on a board
+    /// that has neither.
     fn slow(&mut self) -> Option<Slow> {
         None
     }
@@ -172,8 +181,8 @@ pub trait Inputs {
 
 /// Bytes from the host.
 pub trait ByteSource {
-    /// Waits for at least one byte and returns how many were written; 0 when the link was cut: what was
-    /// gathered of a frame is dropped, and everything that moves comes to rest.
+    /// Waits for at least one byte and returns how many were written; 0 when the link was cut: what
+    /// was gathered of a frame is dropped, and everything that moves comes to rest.
     fn read(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize>;
 }
 

@@ -1,8 +1,9 @@
 //! Events that wait for the link, and which of them give way when the queue is full.
 //!
-//! The queue has a fixed length, and a link may be slower than what happens. When the queue is full, the oldest event of
-//! the lowest rank is dropped, so that counters never displace the state of guard or emergency stop. Lost
-//! scans do not wait here but in the ring ([`crate::ring::Ring::take_loss`]), and are numbered as they are sent.
+//! The queue has a fixed length, and a link may be slower than what happens. When the queue is
+//! full, the oldest event of the lowest rank is dropped, so that counters never displace the state
+//! of guard or emergency stop. Lost scans do not wait here but in the ring
+//! ([`crate::ring::Ring::take_loss`]), and are numbered as they are sent.
 
 use heapless::Vec;
 use jointrig_protocol::event::{Event, Numbered};
@@ -51,7 +52,8 @@ struct Waiting {
 /// The queue, the oldest event first.
 pub struct Events {
     waiting: Vec<Waiting, EVENTS>,
-    /// Number of the next event to be sent. A dropped event uses up a number, so that the host sees a jump.
+    /// Number of the next event to be sent. A dropped event uses up a number, so that the host sees
+    /// a jump.
     next: u32,
 }
 
@@ -66,7 +68,8 @@ impl Events {
         self.waiting.is_empty()
     }
 
-    /// Queues an event; returns how many were dropped for lack of space: 0 or 1, this one or an older one.
+    /// Queues an event; returns how many were dropped for lack of space: 0 or 1, this one or an
+    /// older one.
     pub fn push(&mut self, at_scan: u64, event: Event) -> u32 {
         if matches!(event, Event::Counters(_)) {
             // only the newest counters say anything: older ones that still wait lose nothing
@@ -86,8 +89,8 @@ impl Events {
         dropped
     }
 
-    /// The place of the event that gives way to `event` in a full queue; none where `event` itself is to be
-    /// dropped.
+    /// The place of the event that gives way to `event` in a full queue; none where `event` itself
+    /// is to be dropped.
     fn dispensable(&self, event: &Event) -> Option<usize> {
         let ranks = self.waiting.iter().map(|waiting| rank(&waiting.event)).enumerate();
         // of equal ranks the first one, which is the oldest
@@ -98,7 +101,8 @@ impl Events {
         if rank(event) < Rank::Safety {
             return None;
         }
-        // nothing but states of guard and stop: the oldest one that a newer one of its kind replaces
+        // nothing but states of guard and stop: the oldest one that a newer one of its kind
+        // replaces
         let after = |place: usize| self.waiting.iter().skip(place + 1).map(|waiting| &waiting.event);
         (0..self.waiting.len()).find(|place| {
             let own = &self.waiting[*place].event;
@@ -122,8 +126,9 @@ impl Events {
         Numbered { number, at_scan, event }
     }
 
-    /// A new session begins: what concerned the session before is dropped, because the new host would take
-    /// it for the result of its own orders. Faults and the states of guard and stop wait for the new host.
+    /// A new session begins: what concerned the session before is dropped, because the new host
+    /// would take it for the result of its own orders. Faults and the states of guard and stop wait
+    /// for the new host.
     pub fn begin_session(&mut self) {
         self.waiting.retain(|waiting| match rank(&waiting.event) {
             Rank::Repeated | Rank::Ordered => false,

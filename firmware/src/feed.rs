@@ -1,9 +1,10 @@
 //! Feed: codes for a converter that plays a ring of words for ever, one word per scan.
 //!
-//! Two channels of the board's DMA go round the ring, one step with every scan: the player takes a word to the
-//! converter, and [`TRAIL`] words behind it the eraser writes rest over what was played. So every word is played
-//! once, and what follows the last one given is rest, whether or not any program still runs. This file is
-//! the arithmetic of it: where the next codes go, and whether they come in time.
+//! Two channels of the board's DMA go round the ring, one step with every scan: the player takes a
+//! word to the converter, and [`TRAIL`] words behind it the eraser writes rest over what was
+//! played. So every word is played once, and what follows the last one given is rest, whether or
+//! not any program still runs. This file is the arithmetic of it: where the next codes go, and
+//! whether they come in time.
 //!
 //! ```text
 //!            TRAIL          AHEAD
@@ -15,23 +16,25 @@ use crate::board::RanDry;
 
 /// Words in the ring: 5 ms of 51.2 kHz, a power of two so that the count of scans may wrap.
 pub const RING: u32 = 256;
-/// From rest, the first code is played so many scans later: four blocks of 15, 1.2 ms. Blocks may come late by
-/// as much, less [`AHEAD`].
+/// From rest, the first code is played so many scans later: four blocks of 15, 1.2 ms. Blocks may
+/// come late by as much, less [`AHEAD`].
 pub const LEAD: u32 = 60;
-/// Words that the player may have taken early, and those that pass while a block's codes are written.
+/// Words that the player may have taken early, and those that pass while a block's codes are
+/// written.
 pub const AHEAD: u32 = 16;
 /// How far the eraser is behind the player.
 pub const TRAIL: u32 = 16;
 /// The word of 0 V: the middle of a converter of twelve bits.
 pub const REST: u32 = 1 << 11;
-/// Steps of the converter between 0 V and a code of 32 768: 39 % of its range to either side, because an output
-/// buffer is not linear within 0.2 V of its supply.
+/// Steps of the converter between 0 V and a code of 32 768: 39 % of its range to either side,
+/// because an output buffer is not linear within 0.2 V of its supply.
 pub const SPAN: u32 = 1600;
 /// Steps at the largest code.
 pub const FULL_SCALE_STEPS: f32 = i16::MAX as f32 * SPAN as f32 / 32_768.0;
 
 const _: () = assert!(RING.is_power_of_two() && LEAD > AHEAD);
-/// Parts of a step in which a code is exact: 32 768 codes are 1600 steps, a code is 25 parts of 512.
+/// Parts of a step in which a code is exact: 32 768 codes are 1600 steps, a code is 25 parts of
+/// 512.
 const PARTS: i32 = 512;
 const PARTS_PER_CODE: i32 = 25;
 const _: () = assert!(SPAN.cast_signed() * PARTS == 32_768 * PARTS_PER_CODE);
@@ -61,13 +64,14 @@ impl Feed {
         Self { end: None, ended: false, owed: 0 }
     }
 
-    /// Puts codes behind those given before, or [`LEAD`] scans ahead when there are none or when they have ended.
-    /// No codes are an end. `now` counts the words that the player has taken since it began at the ring's
-    /// first; it may wrap.
+    /// Puts codes behind those given before, or [`LEAD`] scans ahead when there are none or when
+    /// they have ended. No codes are an end. `now` counts the words that the player has taken since
+    /// it began at the ring's first; it may wrap.
     ///
     /// # Errors
-    /// [`RanDry`], with the whole ring at rest: when the player has reached the end of what was given before,
-    /// when so much was given that it would meet what is not yet erased, or when the eraser has not erased.
+    /// [`RanDry`], with the whole ring at rest: when the player has reached the end of what was
+    /// given before, when so much was given that it would meet what is not yet erased, or when the
+    /// eraser has not erased.
     pub fn play(&mut self, now: u32, codes: &[i16], words: &mut impl Words) -> Result<(), RanDry> {
         if codes.is_empty() {
             self.ended = true;
@@ -101,8 +105,9 @@ impl Feed {
         *self = Self::new();
     }
 
-    /// A code's word. What is rounded off is added to the next, so that the mean of some words is finer than a
-    /// step; the noise of it lies at high frequencies, which the filter behind the converter takes.
+    /// A code's word. What is rounded off is added to the next, so that the mean of some words is
+    /// finer than a step; the noise of it lies at high frequencies, which the filter behind the
+    /// converter takes.
     fn word(&mut self, code: i16) -> u32 {
         let exact = i32::from(code) * PARTS_PER_CODE + self.owed;
         let steps = (exact + PARTS / 2).div_euclid(PARTS);
@@ -225,7 +230,8 @@ mod tests {
         let (mut blocks, words) = song(1 + 4 * 20);
         feed.play(converter.now, &blocks.next().expect("a block"), &mut converter.memory).expect("in time");
         for _ in 0..20 {
-            // one block late after the other, until all four come: LEAD + BLOCK - 4 * BLOCK is below AHEAD
+            // one block late after the other, until all four come: LEAD + BLOCK - 4 * BLOCK is
+            // below AHEAD
             converter.scans(3 * BLOCK as u32);
             for block in blocks.by_ref().take(3) {
                 feed.play(converter.now, &block, &mut converter.memory).expect("in time");
@@ -336,7 +342,8 @@ mod tests {
         for (code, word) in [(0, REST), (i16::MIN, REST - SPAN), (i16::MAX, REST + SPAN), (16_384, 2848)] {
             assert_eq!(Feed::new().word(code), word, "{code}");
         }
-        // a code of 5 is a quarter of a step: 64 of them are 15.625 steps, and no word is two steps off
+        // a code of 5 is a quarter of a step: 64 of them are 15.625 steps, and no word is two steps
+        // off
         for code in [5_i16, -5, 1, 17, -1234] {
             let mut feed = Feed::new();
             let steps: Vec<i32> =

@@ -1,8 +1,8 @@
 //! The friction force T from the load cells that ground substructure B.
 //!
-//! Three cells share the force; a 3 × 3 calibration matrix takes their readings (N) to forces (N), and T
-//! is the sum of the three. Since T is linear in the readings, the sum of the matrix's columns is formed
-//! once, and each scan costs three multiplications.
+//! Three cells share the force; a 3 × 3 calibration matrix takes their readings (N) to forces (N),
+//! and T is the sum of the three. Since T is linear in the readings, the sum of the matrix's
+//! columns is formed once, and each scan costs three multiplications.
 
 use jointrig_hot::column;
 use jointrig_protocol::channel::{Channel, Role};
@@ -62,7 +62,8 @@ impl Friction {
         self.weights = self.columns.component_mul(&self.newtons_per_code.transpose());
     }
 
-    /// The mean of T over some scans of so many channels, N: since T is linear in the codes, they are summed as they are.
+    /// The mean of T over some scans of so many channels, N: since T is linear in the codes, they
+    /// are summed as they are.
     pub fn mean_of(&self, codes: &[[u8; 2]], channels: usize) -> f32 {
         let sums = self.places.map(|place| column::sum(codes, channels, place) as f32);
         (self.weights * Vector3::from(sums)).x * channels as f32 / codes.len() as f32

@@ -8,8 +8,8 @@
 //!
 //! It is driven by scans alone, so that a shot happens at the same place in the record whatever the
 //! executor does. It never touches the coil: each block yields at most one [`CoilOrder`], which the
-//! acquisition task carries out. One arming allows one shot. The pulse's length is bounded here, again by
-//! the board's cap, and a last time by the hardware.
+//! acquisition task carries out. One arming allows one shot. The pulse's length is bounded here,
+//! again by the board's cap, and a last time by the hardware.
 
 use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::{Channel, Role};
@@ -24,8 +24,8 @@ use crate::quiet::Quiet;
 use crate::scales::{UnitsPerCode, as_built};
 use crate::scan_time::{ms_of_scans, scans_in_ms};
 
-/// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is a little shorter (docs/WIRING.md): a pulse within it would
-/// be lost in hardware, so the shot waits.
+/// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is a little
+/// shorter (docs/WIRING.md): a pulse within it would be lost in hardware, so the shot waits.
 pub const PAUSE_MS: u32 = 600;
 
 /// What the coil must do now.
@@ -86,7 +86,8 @@ pub struct Hammer {
 }
 
 impl Hammer {
-    /// Disarmed. The force channel is the one of role [`Role::HammerForce`]; without one, no shot is allowed.
+    /// Disarmed. The force channel is the one of role [`Role::HammerForce`]; without one, no shot
+    /// is allowed.
     pub fn new(channels: &[Channel], rate_hz: u32, cap_us: u32) -> Self {
         let force = channels.iter().position(|channel| channel.role == Role::HammerForce);
         Self {
@@ -146,8 +147,8 @@ impl Hammer {
         }
     }
 
-    /// The last shot since the device started, of whichever session: its number and all below are used up,
-    /// so that no word of an old shot is taken for one of a new shot.
+    /// The last shot since the device started, of whichever session: its number and all below are
+    /// used up, so that no word of an old shot is taken for one of a new shot.
     pub fn shot(&self) -> Option<Shot> {
         self.shot
     }
@@ -155,8 +156,8 @@ impl Hammer {
     /// How the pulse is recognised.
     ///
     /// # Errors
-    /// [`Refusal::OutOfBounds`] when the level is not a positive force or a time is longer than a minute;
-    /// [`Refusal::Busy`] while a shot is in hand.
+    /// [`Refusal::OutOfBounds`] when the level is not a positive force or a time is longer than a
+    /// minute; [`Refusal::Busy`] while a shot is in hand.
     pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), Refusal> {
         if matches!(self.state, State::Waiting { .. } | State::Firing { .. } | State::Listening { .. }) {
             return Err(Refusal::Busy);
@@ -178,8 +179,8 @@ impl Hammer {
     /// Allows one shot until `valid_ms` from now.
     ///
     /// # Errors
-    /// [`Refusal::OutOfBounds`] for no or too long a time; [`Refusal::Busy`] while a shot is in hand;
-    /// [`Refusal::Unsupported`] without a force channel.
+    /// [`Refusal::OutOfBounds`] for no or too long a time; [`Refusal::Busy`] while a shot is in
+    /// hand; [`Refusal::Unsupported`] without a force channel.
     pub fn arm(&mut self, now: u64, valid_ms: u32) -> Result<(), Refusal> {
         if self.force.is_none() {
             return Err(Refusal::Unsupported);
@@ -201,8 +202,8 @@ impl Hammer {
     /// Accepts one shot.
     ///
     /// # Errors
-    /// [`Refusal::NotArmed`], [`Refusal::Busy`], [`Refusal::PulseOutOfBounds`], [`Refusal::ShotRepeated`],
-    /// or [`Refusal::OutOfBounds`] for limits that are not finite.
+    /// [`Refusal::NotArmed`], [`Refusal::Busy`], [`Refusal::PulseOutOfBounds`],
+    /// [`Refusal::ShotRepeated`], or [`Refusal::OutOfBounds`] for limits that are not finite.
     pub fn fire(&mut self, order: &Fire) -> Result<(), Refusal> {
         let until = match self.state {
             State::Armed { until } => until,
@@ -249,8 +250,9 @@ impl Hammer {
         Ok(())
     }
 
-    /// Takes back arming and a shot whose coil is not on yet; ends a pulse that is on when `reason` is not
-    /// merely that the host asked. A bolt in flight cannot be taken back, and its record goes on.
+    /// Takes back arming and a shot whose coil is not on yet; ends a pulse that is on when `reason`
+    /// is not merely that the host asked. A bolt in flight cannot be taken back, and its record
+    /// goes on.
     pub fn disarm(&mut self, reason: Reason) -> Outcome {
         let mut outcome = Outcome::default();
         match self.state {

@@ -1,4 +1,5 @@
-//! Which scales hammer, shaker and load cells are judged by: those of the board, or those that a session brought.
+//! Which scales hammer, shaker and load cells are judged by: those of the board, or those that a
+//! session brought.
 
 use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::Channel;
@@ -10,7 +11,8 @@ impl State<'_> {
     /// Judges by these scales from now on.
     ///
     /// # Errors
-    /// [`Refusal::OutOfBounds`]; [`Refusal::HammerArmed`] or [`Refusal::ShakerRuns`] while something may move by the old ones.
+    /// [`Refusal::OutOfBounds`]; [`Refusal::HammerArmed`] or [`Refusal::ShakerRuns`] while
+    /// something may move by the old ones.
     pub fn take_scales(&mut self, channels: &[Channel], units_per_volt: &[f32]) -> Result<(), Refusal> {
         let scales = as_told(channels, units_per_volt)?;
         match self.hammer.state() {

@@ -1,8 +1,8 @@
 //! The rig's controller above its board: acquisition, hammer, shaker, link and safety.
 //!
-//! The same code runs on the controller, in the emulator and inside the simulator. It owns no static, no
-//! executor, no time driver and no logger: a board makes one [`Core`] and runs the four asynchronous
-//! functions that borrow it, each in a task of its own:
+//! The same code runs on the controller, in the emulator and inside the simulator. It owns no
+//! static, no executor, no time driver and no logger: a board makes one [`Core`] and runs the four
+//! asynchronous functions that borrow it, each in a task of its own:
 //!
 //! | function | what it does | when it is late |
 //! |---|---|---|
@@ -11,8 +11,8 @@
 //! | [`transmit::transmit`] | sends answers first, then events, then blocks sent again, then new blocks, then log lines | blocks wait in the ring; what leaves it unsent is reported as lost |
 //! | [`watch::watch`] | disarms hammer and stops shaker when the host falls silent, reports counters | – |
 //!
-//! The scan index is the only clock for results; `embassy-time` serves timeouts. Results never depend on
-//! the order in which an executor polls the four.
+//! The scan index is the only clock for results; `embassy-time` serves timeouts. Results never
+//! depend on the order in which an executor polls the four.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,8 +1,9 @@
 //! The lock-in: amplitude of one frequency in a signal, over whole cycles.
 //!
-//! The signal is multiplied by sine and cosine of the drive's own angle and summed over whole cycles; what is not of
-//! that frequency averages out, an offset entirely. Sums are `f32` over some thousands of scans: each addition is good to 6e-8 of
-//! the sum, which after 10⁴ of them is 1e-5 of the amplitude at most and far less as a rule.
+//! The signal is multiplied by sine and cosine of the drive's own angle and summed over whole
+//! cycles; what is not of that frequency averages out, an offset entirely. Sums are `f32` over some
+//! thousands of scans: each addition is good to 6e-8 of the sum, which after 10⁴ of them is 1e-5 of
+//! the amplitude at most and far less as a rule.
 
 use crate::sine::sine;
 
@@ -48,13 +49,14 @@ pub struct LockIn {
     whole: Sums,
     glance_scans: u32,
     least_scans: u32,
-    /// A cycle has begun since it was asked for: a renewed order comes in the middle of one, and a part of a cycle has any amplitude.
+    /// A cycle has begun since it was asked for: a renewed order comes in the middle of one, and a
+    /// part of a cycle has any amplitude.
     begun: bool,
 }
 
 impl LockIn {
-    /// Measures over the fewest whole cycles that take `least_scans` or more, and glances after the fewest that take
-    /// `glance_scans` or more.
+    /// Measures over the fewest whole cycles that take `least_scans` or more, and glances after the
+    /// fewest that take `glance_scans` or more.
     pub const fn new(glance_scans: u32, least_scans: u32) -> Self {
         Self { glance: Sums::NOTHING, whole: Sums::NOTHING, glance_scans, least_scans, begun: false }
     }
@@ -64,8 +66,8 @@ impl LockIn {
         *self = Self::new(self.glance_scans, self.least_scans);
     }
 
-    /// Takes the signal of one scan at this angle, from which the next scan's differs by `step`. What is seen, when a
-    /// glance or a measurement is complete.
+    /// Takes the signal of one scan at this angle, from which the next scan's differs by `step`.
+    /// What is seen, when a glance or a measurement is complete.
     pub fn feed(&mut self, signal: f32, angle: u32, step: u32) -> Option<Seen> {
         self.begun |= angle < step;
         if !self.begun {
@@ -86,7 +88,8 @@ impl LockIn {
     }
 }
 
-/// core has none, and micromath's is good to some per cent only: one step of Newton's makes 1e-3 of it, two 1e-6.
+/// core has none, and micromath's is good to some per cent only: one step of Newton's makes 1e-3 of
+/// it, two 1e-6.
 fn square_root(value: f32) -> f32 {
     #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
     use micromath::F32Ext;
@@ -148,7 +151,8 @@ mod tests {
 
     #[test]
     fn a_glance_sees_a_change_that_the_measurement_still_averages() {
-        // 256 scans a cycle: two cycles a glance, sixteen a measurement; the amplitude doubles after eight
+        // 256 scans a cycle: two cycles a glance, sixteen a measurement; the amplitude doubles
+        // after eight
         let step = jointrig_protocol::request::Shake::step_of(200.0, 51_200);
         let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), 0_u32);
         let mut seen = std::vec::Vec::new();
@@ -166,7 +170,8 @@ mod tests {
 
     #[test]
     fn what_begins_within_a_cycle_waits_for_the_next_one() {
-        // 2048 scans a cycle, of which four fifths are left: as a glance they would read a seventh too much or too little
+        // 2048 scans a cycle, of which four fifths are left: as a glance they would read a seventh
+        // too much or too little
         let step = jointrig_protocol::request::Shake::step_of(25.0, 51_200);
         for phase in [0.0, 0.8, 1.6] {
             let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), step.wrapping_mul(410));

@@ -1,10 +1,10 @@
 //! Lockstep: how an emulated board and the simulator that serves it share memory and take turns.
 //!
-//! The emulated board has real memory of its own and 16 MB that a process of the PC can map. What a wired
-//! board does with converters, coil, inputs and a USB port, it does through that memory: it writes an
-//! [`Ask`], rings, and stands still until the simulator has written a [`Reply`]. One of the two runs at
-//! any instant, and the board's time is what the reply says. So no clock of the PC enters any result, and
-//! the memory needs no other guard.
+//! The emulated board has real memory of its own and 16 MB that a process of the PC can map. What a
+//! wired board does with converters, coil, inputs and a USB port, it does through that memory: it
+//! writes an [`Ask`], rings, and stands still until the simulator has written a [`Reply`]. One of
+//! the two runs at any instant, and the board's time is what the reply says. So no clock of the PC
+//! enters any result, and the memory needs no other guard.
 //!
 //! | offset | bytes | written by | what |
 //! |---|---|---|---|
@@ -34,7 +34,8 @@ use serde::{Deserialize, Serialize};
 pub const BASE: usize = 0x8000_0000;
 /// Its size: QEMU insists on exactly this much.
 pub const BYTES: usize = 16 << 20;
-/// Changes with this layout, so that an image and a simulator of different sources refuse each other.
+/// Changes with this layout, so that an image and a simulator of different sources refuse each
+/// other.
 pub const MAGIC: u32 = 0x4A52_4C06;
 /// Where [`MAGIC`] stands.
 pub const MAGIC_AT: usize = 0;
@@ -52,7 +53,8 @@ pub const BLOCK_AT: usize = 0x2000;
 pub const DRIVE_FULL_SCALE_V: f32 = 10.0;
 /// Where codes for the shaker's drive stand, each of 16 bits.
 pub const DRIVE_AT: usize = 0x3000;
-/// Where slow values stand ([`Slow`](jointrig_protocol::slow::Slow) in postcard), behind their length as a word.
+/// Where slow values stand ([`Slow`](jointrig_protocol::slow::Slow) in postcard), behind their
+/// length as a word.
 pub const SLOW_AT: usize = 0x5000;
 /// The longest of them.
 pub const SLOW_BYTES: usize = 0x100;
@@ -82,14 +84,16 @@ pub enum Op {
     /// It has started and needs its [`Setup`]; the argument is the low word of its
     /// [`schema::HASH`](jointrig_protocol::schema::HASH).
     Start = 1,
-    /// All tasks wait: for a block, an alarm, bytes, or room for bytes. With an argument of 1 bytes come and go by
-    /// the UART, which the simulator does not see: it answers soon, whatever has come.
+    /// All tasks wait: for a block, an alarm, bytes, or room for bytes. With an argument of 1 bytes
+    /// come and go by the UART, which the simulator does not see: it answers soon, whatever has
+    /// come.
     Idle = 2,
     /// The coil on, for as many µs as the argument says.
     Pulse = 3,
     /// The coil off.
     Off = 4,
-    /// The stage order of as many bytes as the argument says; the reply's length is that of a refusal, or 0.
+    /// The stage order of as many bytes as the argument says; the reply's length is that of a
+    /// refusal, or 0.
     Stage = 5,
     /// The firmware has panicked; a sentence of as many bytes as the argument says tells why.
     Panic = 6,
@@ -97,13 +101,14 @@ pub enum Op {
     Play = 7,
     /// The shaker's drive to rest.
     Rest = 8,
-    /// Both converters' rings start anew with the next scan; the reply's length is that scan's number since the start.
+    /// Both converters' rings start anew with the next scan; the reply's length is that scan's
+    /// number since the start.
     Join = 9,
-    /// The external clock times the scans from now on (argument 1) or the board's own (0); the reply's length is 0, 1 when none comes to
-    /// the input, 2 when it is of another rate.
+    /// The external clock times the scans from now on (argument 1) or the board's own (0); the
+    /// reply's length is 0, 1 when none comes to the input, 2 when it is of another rate.
     Clock = 10,
-    /// The sync output rises, and falls with the next block; the reply's length is when: in parts of 2¹⁶ of a scan after the newest scan's
-    /// successor.
+    /// The sync output rises, and falls with the next block; the reply's length is when: in parts
+    /// of 2¹⁶ of a scan after the newest scan's successor.
     Mark = 11,
 }
 
@@ -278,12 +283,14 @@ const fn joined(low: u32, high: u32) -> u64 {
 /// Bytes of a [`Delivery`].
 pub const DELIVERY_BYTES: usize = 32;
 
-/// Counts of the emulated converters' timer in a period: as many parts as the phases of a [`Moment`] need to tell apart.
+/// Counts of the emulated converters' timer in a period: as many parts as the phases of a
+/// [`Moment`] need to tell apart.
 pub const CLOCK: Clock = Clock { settled: 1, read_from: 10, read_by: 15 };
 /// Blocks in each of the emulated converters' rings, as on the wired board.
 pub const RING_BLOCKS: u32 = 8;
 
-/// What stands before a block: after it come the words of both converters, the first's and then the second's, little-endian.
+/// What stands before a block: after it come the words of both converters, the first's and then the
+/// second's, little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delivery {
     /// Scans of which words stand behind it.
@@ -292,7 +299,8 @@ pub struct Delivery {
     pub trouble: Option<Trouble>,
     /// Periods of the clock that have begun since the start.
     pub periods: u32,
-    /// What the board reads off when it has the block, and again until it can tell: the phase of every second look is a quiet one.
+    /// What the board reads off when it has the block, and again until it can tell: the phase of
+    /// every second look is a quiet one.
     pub moment: Moment,
     /// Something came to the sync port and stands at [`SEEN_AT`].
     pub seen: bool,

@@ -1,9 +1,9 @@
 //! Log lines on their way to the host: encoded, whole, and the first to be given up.
 //!
-//! A board's logger encodes each line (the zero byte that ends it included) and [`Tap::push`]es it. The
-//! transmitter takes lines only when nothing else waits, so that a log never delays a sample; what then finds
-//! no room is dropped whole and counted in [`Counters::logs_dropped`]. The oldest lines stay: what a
-//! board says while it starts reaches the first host that comes.
+//! A board's logger encodes each line (the zero byte that ends it included) and [`Tap::push`]es it.
+//! The transmitter takes lines only when nothing else waits, so that a log never delays a sample;
+//! what then finds no room is dropped whole and counted in [`Counters::logs_dropped`]. The oldest
+//! lines stay: what a board says while it starts reaches the first host that comes.
 //!
 //! A line never spans two link frames, so that each frame can be read by itself.
 //!
@@ -53,8 +53,8 @@ impl<M: RawMutex> Tap<M> {
         }
     }
 
-    /// Takes an encoded line, its zero included, or drops all of it: when there is no room for it, when it is
-    /// longer than [`LINE_BYTES`], and when its last byte is not the zero that ends it.
+    /// Takes an encoded line, its zero included, or drops all of it: when there is no room for it,
+    /// when it is longer than [`LINE_BYTES`], and when its last byte is not the zero that ends it.
     ///
     /// Whoever calls this from an interrupt needs an `M` that allows it.
     pub fn push(&self, line: &[u8]) {
@@ -83,7 +83,8 @@ impl<M: RawMutex> Tap<M> {
         self.lines.lock(|waiting| waiting.borrow().dropped)
     }
 
-    /// Moves as many whole lines as fit into `room`; how many bytes they are, or `None` when nothing waits.
+    /// Moves as many whole lines as fit into `room`; how many bytes they are, or `None` when
+    /// nothing waits.
     #[must_use]
     pub fn take(&self, room: &mut [u8]) -> Option<usize> {
         self.lines.lock(|waiting| {

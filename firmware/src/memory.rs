@@ -1,12 +1,14 @@
 //! The memory of answers that makes requests idempotent.
 //!
-//! A host repeats a request, with its number, until it hears an answer. A number that was carried out is
-//! answered from here and does nothing twice; a number too old to be told from a repeat is refused.
+//! A host repeats a request, with its number, until it hears an answer. A number that was carried
+//! out is answered from here and does nothing twice; a number too old to be told from a repeat is
+//! refused.
 
 use heapless::Deque;
 use jointrig_protocol::answer::Numbered;
 
-/// Answers remembered. A host has one request in the air at a time; eight cover any reordering of repeats.
+/// Answers remembered. A host has one request in the air at a time; eight cover any reordering of
+/// repeats.
 pub const REMEMBERED: usize = 8;
 
 /// What to do with a request of some number.
@@ -37,7 +39,8 @@ impl Memory {
         if let Some(answer) = self.answers.iter().find(|answer| answer.number == number) {
             return Seen::Before(answer.clone());
         }
-        // with the memory full, a number before all that it holds may have been carried out and forgotten
+        // with the memory full, a number before all that it holds may have been carried out and
+        // forgotten
         let forgotten = self.answers.is_full() && self.answers.iter().all(|answer| number < answer.number);
         if forgotten { Seen::Stale } else { Seen::New }
     }

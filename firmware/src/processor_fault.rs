@@ -1,4 +1,5 @@
-//! What a Cortex-M33 says of a fault: its status registers in words (Armv8-M Architecture Reference Manual, DDI 0553, "CFSR").
+//! What a Cortex-M33 says of a fault: its status registers in words (Armv8-M Architecture Reference
+//! Manual, DDI 0553, "CFSR").
 
 use core::fmt;
 

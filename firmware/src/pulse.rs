@@ -1,9 +1,9 @@
 //! The force pulse, followed on the fly: trigger, peak, width, rebounds.
 //!
-//! A pulse of half a millisecond is only some twenty samples at 51.2 kHz, so that the largest sample
-//! is up to a per cent or two below the peak: the peak is a parabola's through the three largest neighbours.
-//! The host judges a record with better means; what is found here is for the operator's eye and for
-//! stopping a campaign that goes wrong.
+//! A pulse of half a millisecond is only some twenty samples at 51.2 kHz, so that the largest
+//! sample is up to a per cent or two below the peak: the peak is a parabola's through the three
+//! largest neighbours. The host judges a record with better means; what is found here is for the
+//! operator's eye and for stopping a campaign that goes wrong.
 
 use heapless::Vec;
 #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
@@ -122,7 +122,8 @@ fn width(samples: &[f32], level: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// A half sine of `peak` N and `width_s` s, begun `phase` of a sample late, as the trigger sees it.
+    /// A half sine of `peak` N and `width_s` s, begun `phase` of a sample late, as the trigger sees
+    /// it.
     fn half_sine(peak: f32, width_s: f32, phase: f32, scan_s: f32) -> impl Iterator<Item = f32> {
         (0..400).map(move |i| {
             let t = (i as f32 + phase) * scan_s;

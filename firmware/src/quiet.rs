@@ -1,15 +1,15 @@
 //! Is the structure quiet? Residual motion before a shot, told from white noise.
 //!
-//! Free on its wire, substructure A rings at some 27 Hz for tens of seconds, and the tail of one hit
-//! would spoil the FRF of the next. A vibrometer's own noise is white and, over its full band, larger than
-//! a tail that matters. So the velocity is averaged over [`DECIMATE`] scans, the variance of these
-//! averages taken over a window, and the part of it that white noise explains, which the differences of
-//! neighbouring scans tell, subtracted:
+//! Free on its wire, substructure A rings at some 27 Hz for tens of seconds, and the tail of one
+//! hit would spoil the FRF of the next. A vibrometer's own noise is white and, over its full band,
+//! larger than a tail that matters. So the velocity is averaged over [`DECIMATE`] scans, the
+//! variance of these averages taken over a window, and the part of it that white noise explains,
+//! which the differences of neighbouring scans tell, subtracted:
 //!
 //! ring² = var(averages) − σ²/32,  σ² = mean(difference²)/2
 //!
-//! The estimate of noise variance over n averages scatters by σ²/32·√(2/n); residual motion below three
-//! times that cannot be told from noise and does not delay a shot for ever.
+//! The estimate of noise variance over n averages scatters by σ²/32·√(2/n); residual motion below
+//! three times that cannot be told from noise and does not delay a shot for ever.
 
 use heapless::Vec;
 use jointrig_protocol::limits::MAX_CHANNELS;
@@ -25,7 +25,8 @@ struct Motion {
     limit_codes: f32,
     last: f32,
     sum: f32,
-    /// The first average of the window, subtracted before squaring so that an offset costs no digits.
+    /// The first average of the window, subtracted before squaring so that an offset costs no
+    /// digits.
     origin: f32,
     averages: f32,
     squares: f32,
@@ -44,8 +45,8 @@ pub struct Quiet {
 }
 
 impl Quiet {
-    /// Watches the channels whose limit (in codes, rms) is above zero over windows of `window` averages.
-    /// With no such channel, or no window, everything is quiet.
+    /// Watches the channels whose limit (in codes, rms) is above zero over windows of `window`
+    /// averages. With no such channel, or no window, everything is quiet.
     pub fn new(limits_codes: impl Iterator<Item = f32>, window: u16) -> Self {
         let motions = limits_codes
             .take(MAX_CHANNELS)
@@ -162,7 +163,8 @@ mod tests {
 
     #[test]
     fn ringing_is_seen_under_noise_eight_times_its_size() {
-        // amplitude 3 codes is 2.1 rms, four times the limit; the noise's averages scatter by 5/√32 = 0.9
+        // amplitude 3 codes is 2.1 rms, four times the limit; the noise's averages scatter by 5/√32
+        // = 0.9
         let (calm, ratio) = verdict(3.0, 5.0, 0.5);
         assert!(!calm && ratio > 2.0, "{ratio}");
         assert!(verdict(0.5, 5.0, 0.5).0);

@@ -43,8 +43,8 @@ pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// The link is cut: whoever gave orders cannot take them back any more, and everything that moves comes to rest. For a board that
-    /// notices by other means than the source of its bytes.
+    /// The link is cut: whoever gave orders cannot take them back any more, and everything that
+    /// moves comes to rest. For a board that notices by other means than the source of its bytes.
     pub fn link_is_cut(&self) {
         self.with(|state| state.bring_to_rest(Reason::LinkLost));
         self.to_send.signal(());
@@ -67,8 +67,9 @@ impl<M: RawMutex> Core<'_, M> {
         }
     }
 
-    /// Answers any Hello of a host, so that even a mismatched one can name both versions; agrees on a
-    /// session only when they match. A new session forgets the old one's requests and stops its doings.
+    /// Answers any Hello of a host, so that even a mismatched one can name both versions; agrees on
+    /// a session only when they match. A new session forgets the old one's requests and stops its
+    /// doings.
     pub(crate) fn greet(&self, payload: &[u8]) {
         let Ok(theirs) = Hello::from_bytes(payload) else {
             self.with(|state| state.counters.frames_bad += 1);
@@ -109,7 +110,8 @@ impl<M: RawMutex> Core<'_, M> {
         };
         self.with(|state| {
             if state.streaming && acknowledge.epoch == state.epoch {
-                // never beyond what was produced: a damaged host must not make room that is not there
+                // never beyond what was produced: a damaged host must not make room that is not
+                // there
                 state.acknowledged = state.acknowledged.max(acknowledge.next_scan.min(state.next_scan));
             }
         });

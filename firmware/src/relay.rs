@@ -1,10 +1,12 @@
 //! Whether the relay that gives the coil its 24 V (K1) does what the guard chain tells it.
 //!
-//! Its forced contacts cannot contradict each other: while a power contact is welded, the contact that is closed at rest stays open
-//! (EN 61810-3). So a board reads that contact back. Each time that the chain opens the relay must be seen to drop, or nothing moves any more; and
-//! after a start it must have been seen to drop once, because nobody knows what happened before.
+//! Its forced contacts cannot contradict each other: while a power contact is welded, the contact
+//! that is closed at rest stays open (EN 61810-3). So a board reads that contact back. Each time
+//! that the chain opens the relay must be seen to drop, or nothing moves any more; and after a
+//! start it must have been seen to drop once, because nobody knows what happened before.
 
-/// Longest time in which the relay may drop or pull, µs: some 20 ms with diode and Zener across its coil, and as much again for bouncing contacts.
+/// Longest time in which the relay may drop or pull, µs: some 20 ms with diode and Zener across its
+/// coil, and as much again for bouncing contacts.
 pub const WITHIN_US: u64 = 50_000;
 
 /// What is wrong with the relay.
@@ -12,7 +14,8 @@ pub const WITHIN_US: u64 = 50_000;
 pub enum Fault {
     /// It has not been seen to drop since the start, or since the chain opened for a moment.
     Unproven,
-    /// The chain opened, and it stayed: a contact is welded, or the wire of its return contact is off.
+    /// The chain opened, and it stayed: a contact is welded, or the wire of its return contact is
+    /// off.
     Stays,
     /// The chain closed, and it did not pull.
     Rests,
@@ -121,7 +124,8 @@ mod tests {
         assert_eq!(after(&welded), Err(Fault::Stays));
         let closed_again = [&welded[..], &[(2_000, true, false)]].concat();
         assert_eq!(after(&closed_again), Err(Fault::Stays));
-        // the guard opens and closes before the relay could have dropped: nobody knows, and nothing moves
+        // the guard opens and closes before the relay could have dropped: nobody knows, and nothing
+        // moves
         let shortly = [&works[..], &[(1_010, false, false), (1_500, true, false)]].concat();
         assert_eq!(after(&shortly), Err(Fault::Unproven));
     }

@@ -99,7 +99,8 @@ impl<M: RawMutex> Core<'_, M> {
                 return Err(Refusal::Clock(fault));
             }
             state.bring_to_rest(Reason::StreamEnded);
-            // each start has room for 65536 streams; after those its epochs run on rather than repeat
+            // each start has room for 65536 streams; after those its epochs run on rather than
+            // repeat
             state.epoch = (self.facts.boot << 16).wrapping_add(state.streams);
             state.streams = state.streams.wrapping_add(1);
             state.ring.restart(state.epoch);

@@ -1,4 +1,5 @@
-//! The ring of recent blocks: the transmit queue and the memory for re-requests are one and the same.
+//! The ring of recent blocks: the transmit queue and the memory for re-requests are one and the
+//! same.
 //!
 //! Blocks enter with increasing first scans. A cursor says what has been sent; what leaves the ring
 //! unsent is counted as dropped and kept as a range until it has been reported.
@@ -107,7 +108,8 @@ impl<'a> Ring<'a> {
     /// The slot of a block that is held, or of the next one.
     #[inline(always)]
     fn place(&self, sequence: u64) -> usize {
-        // the difference is below the length, or equal to it: no division, of which there would be two for each block
+        // the difference is below the length, or equal to it: no division, of which there would be
+        // two for each block
         let place = self.tail_place + (sequence - self.tail) as usize;
         if place >= self.slots.len() { place - self.slots.len() } else { place }
     }
@@ -117,7 +119,8 @@ impl<'a> Ring<'a> {
         &self.slots[self.place(sequence)]
     }
 
-    /// Puts a block in; the oldest leaves when the ring is full. Returns the scans that left unsent.
+    /// Puts a block in; the oldest leaves when the ring is full. Returns the scans that left
+    /// unsent.
     pub fn push(&mut self, first_scan: u64, flags: u8, scans: u8, samples: &[u8; BLOCK_SAMPLE_BYTES]) -> u64 {
         let mut dropped = 0;
         if self.head - self.tail == self.slots.len() as u64 {
@@ -140,9 +143,9 @@ impl<'a> Ring<'a> {
         dropped
     }
 
-    /// Notes a loss for the host. Adjoining ranges of one cause become one. When no further range can be
-    /// noted, the newest one is widened over the scans between: every lost scan is reported, and some that
-    /// arrived are reported too, which changes nothing for a host that has them.
+    /// Notes a loss for the host. Adjoining ranges of one cause become one. When no further range
+    /// can be noted, the newest one is widened over the scans between: every lost scan is reported,
+    /// and some that arrived are reported too, which changes nothing for a host that has them.
     #[inline(never)]
     pub fn report(&mut self, range: Range, why: Loss) {
         self.gap = true;
@@ -200,8 +203,8 @@ impl<'a> Ring<'a> {
         low
     }
 
-    /// The block that holds `scan` or the first one after it, with a flag added, and the scan after its
-    /// last. `None` when everything held is older.
+    /// The block that holds `scan` or the first one after it, with a flag added, and the scan after
+    /// its last. `None` when everything held is older.
     pub fn at_or_after(&self, scan: u64, flag: u8) -> Option<(Out<'_>, u64)> {
         let sequence = self.find(scan);
         if sequence == self.head {

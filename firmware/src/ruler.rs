@@ -1,16 +1,18 @@
 //! From counts of a board's timers to instants in scans, and whether an external clock is good.
 //!
-//! A board has a timer whose period is a scan, a count of those periods, and a third timer that never stops and whose
-//! inputs catch its count at an edge. An edge is thus known in counts of the third; one look at all three, whenever it is taken, says
-//! how many scans ago that was. With an external clock a period is not exactly its nominal count: over a block of scans that is an
-//! error of less than 0.003 of a scan.
+//! A board has a timer whose period is a scan, a count of those periods, and a third timer that
+//! never stops and whose inputs catch its count at an edge. An edge is thus known in counts of the
+//! third; one look at all three, whenever it is taken, says how many scans ago that was. With an
+//! external clock a period is not exactly its nominal count: over a block of scans that is an error
+//! of less than 0.003 of a scan.
 
 use jointrig_protocol::sync::CLOCK_TOLERANCE_PPM;
 
 /// An instant, as seen from the next scan that will be delivered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ago {
-    /// By how many scans the last scan at it or before it precedes the next one to be delivered; negative, follows it.
+    /// By how many scans the last scan at it or before it precedes the next one to be delivered;
+    /// negative, follows it.
     pub scans: i32,
     /// The part of a scan that had passed since, in parts of 2¹⁶.
     pub part: u16,
@@ -26,8 +28,9 @@ pub struct Ruler {
 }
 
 impl Ruler {
-    /// Where an instant lies that is `since` counts before a look at which the timer was `phase` counts into period `now`, when scan
-    /// `next` (in that count of periods) is the next one to be delivered. `since` is at most 2³⁰: 6 s of 160 MHz.
+    /// Where an instant lies that is `since` counts before a look at which the timer was `phase`
+    /// counts into period `now`, when scan `next` (in that count of periods) is the next one to be
+    /// delivered. `since` is at most 2³⁰: 6 s of 160 MHz.
     #[must_use]
     pub fn place(&self, now: u32, phase: u32, since: u32, next: u32) -> Ago {
         let back = since.wrapping_add(self.taken_at).wrapping_sub(phase).cast_signed();
@@ -52,7 +55,8 @@ pub struct Span {
 const PROOF: u32 = 16;
 /// Scans after which the mean of a clock's rate begins anew: 5 minutes of 51.2 kHz.
 const MEAN_OVER: u32 = 1 << 24;
-/// Counts by which a span may be off because both its ends are seen in whole counts, behind a synchroniser of one more.
+/// Counts by which a span may be off because both its ends are seen in whole counts, behind a
+/// synchroniser of one more.
 const SLACK: u32 = 4;
 
 /// Watches an external clock.
@@ -109,7 +113,8 @@ mod tests {
 
     #[test]
     fn an_edge_lies_where_it_was_whenever_it_is_looked_at() {
-        // time in counts; scan k is taken at 3125 k + 160; the counts of periods wrap in the midst of it
+        // time in counts; scan k is taken at 3125 k + 160; the counts of periods wrap in the midst
+        // of it
         let started = u32::MAX - 3;
         for edge in (0..40_000_u32).step_by(37).chain([159, 160, 161, 3284, 3285, 3286]) {
             let after = edge.wrapping_sub(160).cast_signed();
@@ -153,7 +158,8 @@ mod tests {
         for (scans, ppm) in [(15, 400.0), (15, -400.0), (1_500, 205.0), (1_500, -205.0), (15, 1e5)] {
             assert!(!ClockWatch::default().is_good(span(scans, ppm), 3125), "{ppm} ppm over {scans}");
         }
-        // two periods of fifteen in which nothing came: the timer goes on by itself, a hundredth slower
+        // two periods of fifteen in which nothing came: the timer goes on by itself, a hundredth
+        // slower
         assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 46_875 + 2 * 31 }, 3125));
         // a disturbance that came as an edge too many
         assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 46_875 - 1_500 }, 3125));

@@ -1,8 +1,9 @@
 //! The scales by which a session's trigger, quiet, limits and amplitudes are judged.
 //!
-//! A board is built with sensitivities; a laboratory knows better ones. A host that does sends them when its session begins, so that
-//! what is held, limited and triggered on is what the host means: two vibrometers calibrated apart would otherwise leave a part of
-//! the motion that they have in common in their difference.
+//! A board is built with sensitivities; a laboratory knows better ones. A host that does sends them
+//! when its session begins, so that what is held, limited and triggered on is what the host means:
+//! two vibrometers calibrated apart would otherwise leave a part of the motion that they have in
+//! common in their difference.
 
 use heapless::Vec;
 use jointrig_protocol::answer::Refusal;

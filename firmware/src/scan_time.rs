@@ -1,4 +1,5 @@
-//! From times to scans, without a division of 64 bits: this processor has none, and the code for it costs a kilobyte of flash.
+//! From times to scans, without a division of 64 bits: this processor has none, and the code for it
+//! costs a kilobyte of flash.
 
 /// Scans in so many ms, rounded down; exact for times up to a day at any rate below 4 MHz.
 pub(crate) fn scans_in_ms(ms: u32, rate_hz: u32) -> u64 {

@@ -1,4 +1,5 @@
-//! Sentences for people, put together without `core::fmt`, which costs 5 kB of flash as soon as one number is formatted.
+//! Sentences for people, put together without `core::fmt`, which costs 5 kB of flash as soon as one
+//! number is formatted.
 
 use core::fmt;
 

@@ -1,21 +1,25 @@
-//! The shaker's amplitude under control: what a lock-in measures is brought to what was ordered, by the drive.
+//! The shaker's amplitude under control: what a lock-in measures is brought to what was ordered, by
+//! the drive.
 //!
-//! The plant is a structure: its amplitude follows the drive's in proportion, after a delay of some tens of ms
-//! (1 % of damping at 208 Hz settles with 77 ms). So the drive is corrected by ratios: after each measurement by
-//! a part of what is missing, in logarithms, and by a bounded factor. With measurements of 80 ms or more the delay leaves
-//! 0.35 of a change for the next one, and a correction of 0.3 of the error then comes in without swinging: the
-//! roots of (z − 1)(z − 0.35) + 0.3 · 0.65 have the magnitude 0.74 and angles below 23°.
+//! The plant is a structure: its amplitude follows the drive's in proportion, after a delay of some
+//! tens of ms (1 % of damping at 208 Hz settles with 77 ms). So the drive is corrected by ratios:
+//! after each measurement by a part of what is missing, in logarithms, and by a bounded factor.
+//! With measurements of 80 ms or more the delay leaves 0.35 of a change for the next one, and a
+//! correction of 0.3 of the error then comes in without swinging: the roots of (z − 1)(z − 0.35) +
+//! 0.3 · 0.65 have the magnitude 0.74 and angles below 23°.
 //!
-//! **A contact that slips** is no such plant. Up to its limit it is stiff; a per cent of drive beyond, it moves several
-//! times as far, and the amplitude's logarithm changes up to some hundred times as fast as the drive's. Nothing tells beforehand at
-//! which drive that is. So the way up is a climb of small steps with a glance of a few cycles after each, the smaller the less is
-//! missing: r times the amplitude is missing, the next step is r/150. Stiff 500 times over, a contact that lets go at that
-//! step moves some three times as far as was ordered, however far it was from there. When less than a fiftieth
-//! is missing, measurements take over.
+//! **A contact that slips** is no such plant. Up to its limit it is stiff; a per cent of drive
+//! beyond, it moves several times as far, and the amplitude's logarithm changes up to some hundred
+//! times as fast as the drive's. Nothing tells beforehand at which drive that is. So the way up is
+//! a climb of small steps with a glance of a few cycles after each, the smaller the less is
+//! missing: r times the amplitude is missing, the next step is r/150. Stiff 500 times over, a
+//! contact that lets go at that step moves some three times as far as was ordered, however far it
+//! was from there. When less than a fiftieth is missing, measurements take over.
 //!
-//! A glance beyond a ceiling says that the last step went too far: the drive goes back to where it was before, which from then on
-//! is the edge. Up to the edge it is corrected as ever; beyond it by strides that begin at a quarter of the step, and
-//! divided by the steepness that the last two measurements show.
+//! A glance beyond a ceiling says that the last step went too far: the drive goes back to where it
+//! was before, which from then on is the edge. Up to the edge it is corrected as ever; beyond it by
+//! strides that begin at a quarter of the step, and divided by the steepness that the last two
+//! measurements show.
 
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Role};
@@ -44,7 +48,8 @@ const FORGETS: f32 = 0.25;
 const TELLING: f32 = 2e-4;
 /// The longest logarithmic correction of a steep plant: ln 1.2.
 const STRIDE: f32 = 0.182;
-/// What a correction that was too long leaves of the next one's bound, and what one that was not makes of it.
+/// What a correction that was too long leaves of the next one's bound, and what one that was not
+/// makes of it.
 const SHORTER: f32 = 0.25;
 /// See [`SHORTER`].
 const LONGER: f32 = 1.25;
@@ -60,7 +65,8 @@ const LETS_GO: f32 = 4.0;
 const NEAR: f32 = 10.0;
 /// The climb is over when no more than this times the amplitude is wanted.
 const CLIMBED: f32 = 1.02;
-/// The way up begins at this part of the drive's bound: even in a resonance that is far below a small order.
+/// The way up begins at this part of the drive's bound: even in a resonance that is far below a
+/// small order.
 const FIRST_PART: f32 = 0.001;
 /// A glance below this part of the one before says that the amplitude falls.
 const FALLS: f32 = 0.95;
@@ -120,7 +126,8 @@ struct Steep {
 }
 
 impl Servo {
-    /// For the channels of this device; `None` when they do not measure what is to be controlled, or when nothing is.
+    /// For the channels of this device; `None` when they do not measure what is to be controlled,
+    /// or when nothing is.
     pub fn new(gauges: &Gauges<'_>, rate_hz: u32, control: Control, step: u32, most_v: f32) -> Option<Self> {
         let find = |role: Role| {
             let place = gauges.channels.iter().position(|channel| channel.role == role)?;
@@ -170,7 +177,8 @@ impl Servo {
         FIRST_PART * self.most_v
     }
 
-    /// What of an earlier order's control goes on in this one: the measurement under way is dropped.
+    /// What of an earlier order's control goes on in this one: the measurement under way is
+    /// dropped.
     pub fn continues(&mut self, before: &Self) {
         self.measured = before.measured;
         self.last = before.last;
@@ -274,7 +282,8 @@ impl Servo {
         if step.abs() > TELLING {
             let seen =
                 (logarithm(self.measured / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
-            // at the limit itself the plant is stiff one time and steep the next: what is steep is believed at once
+            // at the limit itself the plant is stiff one time and steep the next: what is steep is
+            // believed at once
             steep.ness = if seen > steep.ness { seen } else { steep.ness + FORGETS * (seen - steep.ness) };
         }
         if drive_v >= steep.edge_v {
@@ -289,15 +298,16 @@ impl Servo {
         let Some(Steep { ness, stride, edge_v }) = self.steep else {
             return exponential(PART * missing).clamp(1.0 / FACTOR, FACTOR);
         };
-        // not by clamp, whose panic for bounds that are no constants can print floats and with that costs 16 kB of flash
+        // not by clamp, whose panic for bounds that are no constants can print floats and with that
+        // costs 16 kB of flash
         let bound =
             if drive_v < edge_v { logarithm(edge_v / drive_v).max(stride).min(STRIDE) } else { stride };
         exponential((STEEP_PART * missing / ness).max(-stride).min(bound))
     }
 }
 
-/// The logarithm by its series around 1 in (r − 1)/(r + 1): good to 1e-4 from a half to 2, to 5 % from an eighth to 8; beyond those
-/// it is theirs.
+/// The logarithm by its series around 1 in (r − 1)/(r + 1): good to 1e-4 from a half to 2, to 5 %
+/// from an eighth to 8; beyond those it is theirs.
 fn logarithm(ratio: f32) -> f32 {
     let ratio = ratio.clamp(0.125, 8.0);
     let y = (ratio - 1.0) / (ratio + 1.0);

@@ -6,9 +6,10 @@
 //!    └──── at rest ◀── Stopping ◀──────────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! Like the hammer's, this machine is driven by scans alone. Each delivered block yields the codes of as many scans,
-//! which the acquisition task hands to the drive; a controller that stops giving codes leaves the drive at
-//! rest. The emergency stop is the one thing that does not ramp: it takes the drive away at once.
+//! Like the hammer's, this machine is driven by scans alone. Each delivered block yields the codes
+//! of as many scans, which the acquisition task hands to the drive; a controller that stops giving
+//! codes leaves the drive at rest. The emergency stop is the one thing that does not ramp: it takes
+//! the drive away at once.
 
 use heapless::Vec;
 use jointrig_protocol::answer::{self, Refusal};
@@ -109,11 +110,12 @@ impl<'a> Shaker<'a> {
         self.full_scale_v * 1000.0 / SHAKE_RAMP_MS as f32
     }
 
-    /// Accepts an order; from rest, the sine begins at its zero. An order that is refused changes nothing.
+    /// Accepts an order; from rest, the sine begins at its zero. An order that is refused changes
+    /// nothing.
     ///
     /// # Errors
-    /// [`Refusal::Unsupported`] without a shaker, or without the channels that measure what is to be controlled;
-    /// [`Refusal::OutOfBounds`] says which bound.
+    /// [`Refusal::Unsupported`] without a shaker, or without the channels that measure what is to
+    /// be controlled; [`Refusal::OutOfBounds`] says which bound.
     pub fn shake(&mut self, now: u64, order: &Shake) -> Result<Option<Event>, Refusal> {
         if self.full_scale_v <= 0.0 {
             return Err(Refusal::Unsupported);
@@ -159,8 +161,8 @@ impl<'a> Shaker<'a> {
         self.step = order.step;
         self.ordered_v = match (&mut servo, &self.servo) {
             (None, _) => order.amplitude_v,
-            // an order renewed or changed goes on from the drive that it finds; not by clamp, whose panic can print
-            // floats and with that costs 16 kB of flash
+            // an order renewed or changed goes on from the drive that it finds; not by clamp, whose
+            // panic can print floats and with that costs 16 kB of flash
             (Some(servo), Some(before)) if !was_resting => {
                 servo.continues(before);
                 self.ordered_v.max(servo.first_v()).min(order.amplitude_v)
@@ -221,7 +223,8 @@ impl<'a> Shaker<'a> {
             if stops.is_none() {
                 stops = self.correct(block, scan);
             }
-            // the amplitude is at most full scale, so that the product is a code; it is rounded to the nearest
+            // the amplitude is at most full scale, so that the product is a code; it is rounded to
+            // the nearest
             let exact = self.amplitude_v * code_per_v * sine(self.angle);
             *code = (exact + 0.5_f32.copysign(exact)) as i16;
             self.angle = self.angle.wrapping_add(self.step);
@@ -238,7 +241,8 @@ impl<'a> Shaker<'a> {
         [stops, rests.then_some(Event::ShakerRests)]
     }
 
-    /// Lets the controller see a scan, and follows it. What it measures need not be in phase with what is driven.
+    /// Lets the controller see a scan, and follows it. What it measures need not be in phase with
+    /// what is driven.
     fn correct(&mut self, block: &impl Scanned, scan: usize) -> Option<Event> {
         let State::Running { .. } = self.state else { return None };
         let servo = self.servo.as_mut()?;

@@ -5,7 +5,8 @@ use micromath::F32Ext;
 
 /// The resistor from the reference to the Pt1000, Ω.
 const SERIES_OHM: f32 = 2_200.0;
-/// Platinum, IEC 60751: R = R₀ (1 + A t + B t²) above 0 °C, and 0.1 K off at −40 °C, where a third term begins.
+/// Platinum, IEC 60751: R = R₀ (1 + A t + B t²) above 0 °C, and 0.1 K off at −40 °C, where a third
+/// term begins.
 const R0_OHM: f32 = 1_000.0;
 /// See [`R0_OHM`], 1/K.
 const A: f32 = 3.9083e-3;
@@ -14,8 +15,9 @@ const B: f32 = -5.775e-7;
 /// Temperatures that a specimen in a laboratory can have; beyond them the sensor is off or shorted.
 const BELIEVED_C: core::ops::Range<f32> = -50.0..150.0;
 
-/// Temperature of a Pt1000 to ground, behind its series resistor from the converter's own reference: `part` is the voltage at the sensor over
-/// the reference. °C; none where no sensor can be.
+/// Temperature of a Pt1000 to ground, behind its series resistor from the converter's own
+/// reference: `part` is the voltage at the sensor over the reference. °C; none where no sensor can
+/// be.
 #[must_use]
 pub fn pt1000_c(part: f32) -> Option<f32> {
     if !(part > 0.0 && part < 1.0) {

@@ -55,8 +55,8 @@ pub struct Facts<'a> {
     pub sync: bool,
     /// Why the device started.
     pub reset: Reset,
-    /// Tells this start from all others: one more than the last start's, or a number that none had. Its low 16 bits
-    /// are the upper ones of the first stream's epoch.
+    /// Tells this start from all others: one more than the last start's, or a number that none had.
+    /// Its low 16 bits are the upper ones of the first stream's epoch.
     pub boot: u32,
 }
 
@@ -119,7 +119,8 @@ impl<'a, M: RawMutex> Core<'a, M> {
     /// `slots` is the memory of the ring: at least a second of all channels.
     ///
     /// # Panics
-    /// When there are no channels, more than 16, or no slots: a board's mistake that no run can mend.
+    /// When there are no channels, more than 16, or no slots: a board's mistake that no run can
+    /// mend.
     pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
         assert!(limits::scans_per_block(facts.channels.len()).is_some(), "a scan has 1 to 16 channels");
         assert!(!slots.is_empty(), "the ring needs memory");
@@ -145,7 +146,8 @@ impl<'a, M: RawMutex> Core<'a, M> {
             acknowledged: 0,
             last_heard: Instant::from_ticks(0),
             last_block: Instant::from_ticks(0),
-            // closed and released until the board says otherwise, which it does with the first block
+            // closed and released until the board says otherwise, which it does with the first
+            // block
             interlock_closed: true,
             emergency_stop: false,
             coil: None,
@@ -175,11 +177,11 @@ impl<'a, M: RawMutex> Core<'a, M> {
         self.state.lock(|state| f(&mut state.borrow_mut()))
     }
 
-    /// Guard and emergency stop as they are now, told by a board whose inputs interrupt; from any task, whatever
-    /// acquisition does. The host hears of a change even when no blocks come.
+    /// Guard and emergency stop as they are now, told by a board whose inputs interrupt; from any
+    /// task, whatever acquisition does. The host hears of a change even when no blocks come.
     ///
-    /// Returns whether the caller must take the coil's current away at once. Acquisition gets the same
-    /// order, so that one of the two carries it out when the other is stuck.
+    /// Returns whether the caller must take the coil's current away at once. Acquisition gets the
+    /// same order, so that one of the two carries it out when the other is stuck.
     #[must_use]
     pub fn see_inputs(&self, interlock_closed: bool, emergency_stop: bool) -> bool {
         let danger = !interlock_closed || emergency_stop;
@@ -262,7 +264,8 @@ impl State<'_> {
         self.tell(&outcome);
     }
 
-    /// Brings everything that moves to rest, for a reason: the hammer is disarmed, the shaker ramps down.
+    /// Brings everything that moves to rest, for a reason: the hammer is disarmed, the shaker ramps
+    /// down.
     pub fn bring_to_rest(&mut self, reason: Reason) {
         self.disarm(reason);
         let stops = self.shaker.stop(reason);
@@ -291,7 +294,8 @@ impl State<'_> {
         }
     }
 
-    /// Whether anything may move at all: the one gate before arming, before a shot and before the shaker.
+    /// Whether anything may move at all: the one gate before arming, before a shot and before the
+    /// shaker.
     pub fn may_move(&self) -> Result<(), Refusal> {
         if !self.streaming {
             return Err(Refusal::NotStreaming);
@@ -305,8 +309,8 @@ impl State<'_> {
         Ok(())
     }
 
-    /// Heeds guard and emergency stop as they are now. Releasing the stop is not heeded here: that takes a
-    /// reset at the rig.
+    /// Heeds guard and emergency stop as they are now. Releasing the stop is not heeded here: that
+    /// takes a reset at the rig.
     pub fn heed(&mut self, interlock_closed: bool, pressed: bool) {
         if pressed && !self.emergency_stop {
             self.stop_everything();

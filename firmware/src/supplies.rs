@@ -1,4 +1,5 @@
-//! Sensors that are fed with a constant current: what needs one does not move while its cable is open or shorted.
+//! Sensors that are fed with a constant current: what needs one does not move while its cable is
+//! open or shorted.
 
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::event::Reason;
@@ -7,14 +8,16 @@ use jointrig_protocol::slow::{Slow, Supply};
 use crate::state::State;
 
 impl State<'_> {
-    /// Whether the sensor of a channel is there, as far as a supply can tell; a channel without one is not asked about.
+    /// Whether the sensor of a channel is there, as far as a supply can tell; a channel without one
+    /// is not asked about.
     pub fn is_fed(&self, channel: Option<usize>) -> Result<(), Refusal> {
         let own = |supply: &&Supply| Some(usize::from(supply.channel)) == channel;
         let Some(supply) = self.slow.supplies.iter().find(own) else { return Ok(()) };
         supply.fault().map_or(Ok(()), |fault| Err(Refusal::Supply { channel: supply.channel, fault }))
     }
 
-    /// Takes what was measured. A hammer whose force is not felt is disarmed, a shaker whose force is not felt comes to rest.
+    /// Takes what was measured. A hammer whose force is not felt is disarmed, a shaker whose force
+    /// is not felt comes to rest.
     #[inline(never)]
     pub fn take_slow(&mut self, slow: Slow) {
         self.slow = slow;

@@ -1,7 +1,9 @@
-//! In step with another recorder: which clock times the scans, edges at the sync input, pulses of the output.
+//! In step with another recorder: which clock times the scans, edges at the sync input, pulses of
+//! the output.
 //!
-//! Nothing here moves anything: an edge is told, and a pulse follows what hammer and host do. An external clock that fails is a failed
-//! front end: the stream ends, everything comes to rest, and the scans go on by the board's own crystal.
+//! Nothing here moves anything: an edge is told, and a pulse follows what hammer and host do. An
+//! external clock that fails is a failed front end: the stream ends, everything comes to rest, and
+//! the scans go on by the board's own crystal.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::answer::{Answer, Refusal};

@@ -1,8 +1,9 @@
-//! Transmitting: answers first, then lost scans, then other events, then blocks sent again, then new blocks, then log lines.
+//! Transmitting: answers first, then lost scans, then other events, then blocks sent again, then
+//! new blocks, then log lines.
 //!
-//! A request is therefore never starved by samples: it waits for at most the one frame that is on its
-//! way. When the link is slower than the samples, blocks wait in the ring, and what leaves it unsent is
-//! reported as a range before the next block goes out.
+//! A request is therefore never starved by samples: it waits for at most the one frame that is on
+//! its way. When the link is slower than the samples, blocks wait in the ring, and what leaves it
+//! unsent is reported as a range before the next block goes out.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::block::{HEADER_PAYLOAD, RESENT};
@@ -68,7 +69,8 @@ impl<M: RawMutex> Core<'_, M> {
         })
     }
 
-    /// Lines wait until the next look, a tenth of a second at most: none is worth a wake-up of its own.
+    /// Lines wait until the next look, a tenth of a second at most: none is worth a wake-up of its
+    /// own.
     fn log_lines(&self, writer: &mut Writer) -> Option<usize> {
         let length = self.logs.filter(|tap| tap.waits())?.take(writer.payload_mut())?;
         writer.restart(Kind::Log);

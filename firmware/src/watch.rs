@@ -1,5 +1,5 @@
-//! Watching: a silent host disarms the hammer and stops the shaker, as does a silent front end; dropped log lines are
-//! counted, and the counters are told once a second.
+//! Watching: a silent host disarms the hammer and stops the shaker, as does a silent front end;
+//! dropped log lines are counted, and the counters are told once a second.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, Instant, Timer};
@@ -32,7 +32,8 @@ pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
             let blind = Instant::now().saturating_duration_since(state.last_block).as_millis();
             if (armed || shakes) && blind >= u64::from(SCAN_SILENCE_MS) {
                 warning!("no scans: everything comes to rest");
-                // its ramp waits for the next block, as its codes do: without blocks the drive rests already
+                // its ramp waits for the next block, as its codes do: without blocks the drive
+                // rests already
                 state.bring_to_rest(Reason::FrontEnd);
             }
             if let Some(tap) = core.logs {

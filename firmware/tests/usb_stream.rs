@@ -1,5 +1,6 @@
-//! The whole firmware behind its USB device, with the host in the same process: what a host that does not read, and
-//! a bus that is reset, cost. Time stands still in here; what needs it to pass is tested in hil-sim.
+//! The whole firmware behind its USB device, with the host in the same process: what a host that
+//! does not read, and a bus that is reset, cost. Time stands still in here; what needs it to pass
+//! is tested in hil-sim.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 #[path = "usb/bus.rs"]
@@ -228,7 +229,8 @@ impl Session {
     }
 }
 
-/// Reads until `blocks` blocks are accounted for; returns those that came and how many scans were reported lost.
+/// Reads until `blocks` blocks are accounted for; returns those that came and how many scans were
+/// reported lost.
 async fn collect(session: &Session, way: Interface, blocks: usize) -> (Vec<(u64, i16)>, u64) {
     let (mut came, mut lost) = (Vec::new(), 0);
     while came.len() as u64 * SCANS + lost < blocks as u64 * SCANS {

@@ -1,10 +1,11 @@
-//! A controller's log lines: which image they came from, where its table of strings is kept, and what they say.
+//! A controller's log lines: which image they came from, where its table of strings is kept, and
+//! what they say.
 //!
-//! A controller sends its log as numbers (defmt): the strings stay behind in the image's ELF file, in a table
-//! that fits this one build and no other. The linker writes a hash of the whole image into it
-//! (`.note.gnu.build-id`); its first eight bytes are the *build id*. The controller says it in `Info`, and
-//! a table is kept as [`FOLDER`]`/`[`file_name`]. So whoever has changed a line and flashed the result
-//! can never be shown the text of another build.
+//! A controller sends its log as numbers (defmt): the strings stay behind in the image's ELF file,
+//! in a table that fits this one build and no other. The linker writes a hash of the whole image
+//! into it (`.note.gnu.build-id`); its first eight bytes are the *build id*. The controller says it
+//! in `Info`, and a table is kept as [`FOLDER`]`/`[`file_name`]. So whoever has changed a line and
+//! flashed the result can never be shown the text of another build.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "example")]

@@ -57,8 +57,8 @@ impl Table {
         self.build
     }
 
-    /// Hands every line in `bytes` to `each`. Each line ends with a zero byte, so that a damaged one costs
-    /// no other. Returns how many bytes made no line.
+    /// Hands every line in `bytes` to `each`. Each line ends with a zero byte, so that a damaged
+    /// one costs no other. Returns how many bytes made no line.
     pub fn lines(&self, bytes: &[u8], mut each: impl FnMut(Line)) -> usize {
         let mut lost = 0;
         for encoded in bytes.split_inclusive(|byte| *byte == 0).filter(|encoded| *encoded != [0]) {

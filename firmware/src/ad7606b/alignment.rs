@@ -1,13 +1,17 @@
-//! Whether what two chips sent is in step with the clock that made them convert, block by block, and exactly.
+//! Whether what two chips sent is in step with the clock that made them convert, block by block,
+//! and exactly.
 //!
-//! Each chip is read into a ring of its own by hardware, which begins when BUSY falls. A fall that was not seen leaves a chip one scan
-//! behind for good, a fall too many puts it ahead, a word that was lost tears its scans; no CRC tells the first two. So at
-//! one moment, after a block was copied, three things are read off: the count of the clock's periods with its phase, and how far
-//! either ring is filled. Away from the few µs of a read-out these must agree to the word. Then the block is proven: both rings hold
-//! exactly the scans that the clock says, and what was copied was complete and not yet overwritten.
+//! Each chip is read into a ring of its own by hardware, which begins when BUSY falls. A fall that
+//! was not seen leaves a chip one scan behind for good, a fall too many puts it ahead, a word that
+//! was lost tears its scans; no CRC tells the first two. So at one moment, after a block was
+//! copied, three things are read off: the count of the clock's periods with its phase, and how far
+//! either ring is filled. Away from the few µs of a read-out these must agree to the word. Then the
+//! block is proven: both rings hold exactly the scans that the clock says, and what was copied was
+//! complete and not yet overwritten.
 //!
-//! Nothing here counts interrupts, so that none can come late; and no block leaves before it is proven, so that a slip costs the
-//! block in hand and what went by since, and never a scan that was sent as good.
+//! Nothing here counts interrupts, so that none can come late; and no block leaves before it is
+//! proven, so that a slip costs the block in hand and what went by since, and never a scan that was
+//! sent as good.
 
 use jointrig_hot::pair::CHIP_BYTES;
 
@@ -17,7 +21,8 @@ pub const SCAN_WORDS: u32 = CHIP_BYTES as u32 / 2;
 /// A period of the clock, in counts of its timer.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
-    /// From here on a period's count and its phase belong together: the counter of periods hears of a new one a few counts late.
+    /// From here on a period's count and its phase belong together: the counter of periods hears of
+    /// a new one a few counts late.
     pub settled: u32,
     /// Before this no read-out of the period's scan begins.
     pub read_from: u32,
@@ -61,7 +66,8 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// Judges block `number`, counted from the rings' start (it may wrap when `blocks` is a power of two).
+    /// Judges block `number`, counted from the rings' start (it may wrap when `blocks` is a power
+    /// of two).
     #[must_use]
     pub fn judge(&self, number: u32, moment: &Moment) -> Verdict {
         let Clock { settled, read_from, read_by } = self.clock;

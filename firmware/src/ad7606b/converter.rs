@@ -1,7 +1,8 @@
 //! One chip: reset, identity, settings, diagnostics, single conversions.
 //!
-//! A register access is two or three bytes at most, so it blocks for a few µs at set-up; only the end
-//! of a conversion is waited for, and never longer than [`BUSY_PATIENCE`] times the data sheet's longest.
+//! A register access is two or three bytes at most, so it blocks for a few µs at set-up; only the
+//! end of a conversion is waited for, and never longer than [`BUSY_PATIENCE`] times the data
+//! sheet's longest.
 
 use embassy_futures::select::{Either, select};
 use embedded_hal::delay::DelayNs;
@@ -15,7 +16,8 @@ use super::part::{Lines, Oversampling, Part};
 use super::range::Range;
 use super::{CHANNELS, Error, registers as reg};
 
-/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, "Timing Specifications", tRESET.
+/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, "Timing Specifications",
+/// tRESET.
 const RESET_NS: u32 = 5_000;
 /// After a full reset the chip loads its own calibration: tDEVICE_SETUP is 253 µs.
 const SETUP_US: u32 = 300;
@@ -54,11 +56,11 @@ impl Default for Settings {
     }
 }
 
-/// One chip in software mode (OS0…OS2 tied high), on a port of its own: `S` frames each access with CS, `R`
-/// is its RESET pin.
+/// One chip in software mode (OS0…OS2 tied high), on a port of its own: `S` frames each access with
+/// CS, `R` is its RESET pin.
 ///
-/// The port must be of mode 2 (clock idles high, data are taken on its falling edge): AD7606B Rev. 0,
-/// "Serial Interface".
+/// The port must be of mode 2 (clock idles high, data are taken on its falling edge): AD7606B Rev.
+/// 0, "Serial Interface".
 #[derive(Debug)]
 pub struct Converter<S, R> {
     spi: S,
@@ -92,8 +94,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok((self.spi, self.reset))
     }
 
-    /// Full reset: all registers have their first values again. Then checks that the chip was indeed reset,
-    /// and that it is the right one.
+    /// Full reset: all registers have their first values again. Then checks that the chip was
+    /// indeed reset, and that it is the right one.
     ///
     /// # Errors
     /// [`Error::NotReset`], [`Error::Identity`], or the port's and pin's own.
@@ -119,8 +121,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
     /// Applies the settings and reads every one of them back.
     ///
     /// # Errors
-    /// [`Error::NoRange`], [`Error::NoLayout`] before anything is written; [`Error::Readback`] when the chip
-    /// did not take one.
+    /// [`Error::NoRange`], [`Error::NoLayout`] before anything is written; [`Error::Readback`] when
+    /// the chip did not take one.
     pub fn configure(&mut self, settings: &Settings) -> Done<S, R> {
         let part = self.part.name;
         if let Some(range) = settings.ranges.into_iter().find(|range| !self.part.ranges.contains(range)) {
@@ -161,10 +163,10 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(bits)
     }
 
-    /// Lets the chip look for open inputs on the channels whose bits are set, by itself: an input counts as
-    /// open when it gave small codes for `conversions` in a row and then follows a change of the amplifier's
-    /// common mode, which a driven input does not (AD7606B Rev. 0, "Open Circuit Detection"; each input
-    /// needs 10 kΩ across it at the source end).
+    /// Lets the chip look for open inputs on the channels whose bits are set, by itself: an input
+    /// counts as open when it gave small codes for `conversions` in a row and then follows a change
+    /// of the amplifier's common mode, which a driven input does not (AD7606B Rev. 0, "Open Circuit
+    /// Detection"; each input needs 10 kΩ across it at the source end).
     ///
     /// # Errors
     /// The port's own, or [`Error::Readback`].
@@ -174,7 +176,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         self.write(reg::OPEN_DETECT_ENABLE, channels)
     }
 
-    /// Channels that were found open since they were last asked for, one bit each; asking clears them.
+    /// Channels that were found open since they were last asked for, one bit each; asking clears
+    /// them.
     ///
     /// # Errors
     /// The port's own.
@@ -194,8 +197,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(self.read(reg::STATUS)? & reg::RESET_DETECT != 0)
     }
 
-    /// Starts one conversion, waits for its end and reads it through DOUTA. With several lines in use, the
-    /// channels of the others stay 0: a single port reads a single line.
+    /// Starts one conversion, waits for its end and reads it through DOUTA. With several lines in
+    /// use, the channels of the others stay 0: a single port reads a single line.
     ///
     /// # Errors
     /// [`Error::BusyStuck`], [`Error::Data`], or the port's and pins' own.
@@ -218,7 +221,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
             Either::First(fallen) => fallen.map_err(Error::Pin)?,
             Either::Second(()) => return Err(Error::BusyStuck { after_us }),
         }
-        // all of it on the first line, whichever others are in use: what follows a line's own data is not read
+        // all of it on the first line, whichever others are in use: what follows a line's own data
+        // is not read
         let layout = Layout::new(self.part, self.settings.lines, self.settings.crc)
             .ok_or(Error::NoLayout { part: self.part.name })?;
         let mut line = [0; LINE_BYTES_MAX];
@@ -230,8 +234,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(codes)
     }
 
-    /// Lets the chip send its known pattern in place of a conversion, checks what arrives, and then what the
-    /// chip found wrong with itself.
+    /// Lets the chip send its known pattern in place of a conversion, checks what arrives, and then
+    /// what the chip found wrong with itself.
     ///
     /// # Errors
     /// [`Error::Pattern`], [`Error::Digital`], and all of [`Self::convert`].
@@ -264,8 +268,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         }
     }
 
-    /// Writes DIGITAL_DIAG_ENABLE. The frame that switches the CRC on has none yet; the one that switches it
-    /// off still has one.
+    /// Writes DIGITAL_DIAG_ENABLE. The frame that switches the CRC on has none yet; the one that
+    /// switches it off still has one.
     fn watch_itself(&mut self, crc: bool, pattern: bool) -> Done<S, R> {
         let value = WATCHED
             | if crc { reg::INTERFACE_CRC } else { 0 }

@@ -1,8 +1,8 @@
 //! What comes out of the DOUT lines after a conversion, and the CRC behind it.
 //!
-//! Channels come in order, most significant bit first, shared evenly between the lines in use: one line
-//! carries V1…V8, two carry V1…V4 and V5…V8, and so on. With the CRC on, each line ends with 16 bits over the
-//! data of that line alone (AD7606B Rev. 0, "Interface CRC Checksum").
+//! Channels come in order, most significant bit first, shared evenly between the lines in use: one
+//! line carries V1…V8, two carry V1…V4 and V5…V8, and so on. With the CRC on, each line ends with
+//! 16 bits over the data of that line alone (AD7606B Rev. 0, "Interface CRC Checksum").
 
 use crc::{Algorithm, Crc, NoTable};
 
@@ -30,7 +30,8 @@ const DATA_CRC: Algorithm<u16> = Algorithm {
     check: 0x2E8F,
     residue: 0,
 };
-/// Bit by bit: it is for the few conversions of a set-up. What runs with every scan is [`jointrig_hot::pair`].
+/// Bit by bit: it is for the few conversions of a set-up. What runs with every scan is
+/// [`jointrig_hot::pair`].
 const DATA: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&DATA_CRC);
 
 /// The CRC over a line's data.
@@ -58,8 +59,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of each of `lines` lines; `None` when the part has not so many, or when a line would not
-    /// be whole bytes (18 bits on four or eight lines).
+    /// The layout of each of `lines` lines; `None` when the part has not so many, or when a line
+    /// would not be whole bytes (18 bits on four or eight lines).
     #[must_use]
     pub fn new(part: &Part, lines: Lines, crc: bool) -> Option<Self> {
         let channels = CHANNELS / lines.count();
@@ -83,8 +84,8 @@ impl Layout {
         self.channels * usize::from(self.bits) / 8
     }
 
-    /// Reads one line's bytes into the codes of its channels, sign extended. What `line` or `codes` is too
-    /// short for is left out.
+    /// Reads one line's bytes into the codes of its channels, sign extended. What `line` or `codes`
+    /// is too short for is left out.
     ///
     /// # Errors
     /// [`CrcMismatch`], and then `codes` is untouched.

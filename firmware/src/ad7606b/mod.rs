@@ -1,14 +1,16 @@
-//! The AD7606B: eight channels, 16 bit, sampled together on one edge of CONVST; and its 16- and 18-bit
-//! successors AD7606C-16 and AD7606C-18, which share its pins, registers and frames.
+//! The AD7606B: eight channels, 16 bit, sampled together on one edge of CONVST; and its 16- and
+//! 18-bit successors AD7606C-16 and AD7606C-18, which share its pins, registers and frames.
 //!
-//! The driver stands on embedded-hal's traits, so that the same code talks to the chip and to the model
-//! of it that the tests use. Setting up is its business, and so is the meaning of what the chip clocks
-//! out; moving sixteen channels at 51.2 kHz is a board's, by DMA, and [`reader`] makes scans of the words.
+//! The driver stands on embedded-hal's traits, so that the same code talks to the chip and to the
+//! model of it that the tests use. Setting up is its business, and so is the meaning of what the
+//! chip clocks out; moving sixteen channels at 51.2 kHz is a board's, by DMA, and [`reader`] makes
+//! scans of the words.
 //!
 //! The chip has two faces on one serial port. In *ADC mode* a frame of CS clocks out the last
-//! conversion while SDI is low. A frame whose SDI says "read a register" leads into *register mode*, where
-//! every frame is a command and a read's answer comes with the next frame; writing 0 to address 0 leads
-//! back. Data sheet: AD7606B Rev. 0, "Software Mode", "Digital Interface", "Register Summary".
+//! conversion while SDI is low. A frame whose SDI says "read a register" leads into *register
+//! mode*, where every frame is a command and a read's answer comes with the next frame; writing 0
+//! to address 0 leads back. Data sheet: AD7606B Rev. 0, "Software Mode", "Digital Interface",
+//! "Register Summary".
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -73,8 +73,8 @@ impl Lines {
 pub struct Part {
     /// Its name.
     pub name: &'static str,
-    /// DEVICE_ID, the upper half of the ID register. The AD7606C's data sheet says 3; chips that answer 2
-    /// have been met, so both are taken.
+    /// DEVICE_ID, the upper half of the ID register. The AD7606C's data sheet says 3; chips that
+    /// answer 2 have been met, so both are taken.
     pub device_ids: &'static [u8],
     /// Bits of a conversion.
     pub bits: u8,
@@ -82,7 +82,8 @@ pub struct Part {
     pub ranges: &'static [Range],
     /// Most lines on which data can come out at once.
     pub most_lines: Lines,
-    /// Whether each channel's filter can be told to pass 220 kHz instead of 25 kHz (BANDWIDTH register).
+    /// Whether each channel's filter can be told to pass 220 kHz instead of 25 kHz (BANDWIDTH
+    /// register).
     pub has_bandwidth: bool,
     /// Longest time from CONVST to the end of BUSY, µs, by [`Oversampling`].
     conversion_us: [u16; 9],
@@ -128,7 +129,8 @@ impl Part {
         self.conversion_us[oversampling as usize] as u32
     }
 
-    /// By how much a sample lags the instant of CONVST, ns: half of the time over which it is averaged.
+    /// By how much a sample lags the instant of CONVST, ns: half of the time over which it is
+    /// averaged.
     #[must_use]
     pub const fn averaging_delay_ns(&self, oversampling: Oversampling) -> u32 {
         match oversampling {

@@ -1,7 +1,7 @@
 //! Input ranges; codes to volts and back.
 //!
-//! A code is two's complement, and code 0 is 0 V: one step is `2 × full scale / 2^bits` (AD7606B Rev. 0, "ADC
-//! Transfer Function").
+//! A code is two's complement, and code 0 is 0 V: one step is `2 × full scale / 2^bits` (AD7606B
+//! Rev. 0, "ADC Transfer Function").
 
 /// Full scale of a channel, single-ended and bipolar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,8 +20,8 @@ pub enum Range {
 }
 
 impl Range {
-    /// Its code in the RANGE registers. The AD7606B takes every code above 1 for ± 10 V and has 3 after a
-    /// reset; the AD7606C means ± 10 V by 3: so 3 is right for both.
+    /// Its code in the RANGE registers. The AD7606B takes every code above 1 for ± 10 V and has 3
+    /// after a reset; the AD7606C means ± 10 V by 3: so 3 is right for both.
     #[must_use]
     pub const fn code(self) -> u8 {
         self as u8
@@ -53,7 +53,8 @@ impl Range {
         code as f32 * self.full_scale_v() / half_span(bits)
     }
 
-    /// The code of `bits` bits that a voltage comes out as; what is beyond the range comes out as its end.
+    /// The code of `bits` bits that a voltage comes out as; what is beyond the range comes out as
+    /// its end.
     #[must_use]
     pub fn code_of(self, volts: f32, bits: u8) -> i32 {
         let half = half_span(bits);

@@ -1,4 +1,5 @@
-//! From blocks of two rings to scans: proven, joined, and with a count of those that are missing before them.
+//! From blocks of two rings to scans: proven, joined, and with a count of those that are missing
+//! before them.
 
 use jointrig_hot::pair::{CHIP_BYTES, join};
 
@@ -6,7 +7,8 @@ use super::alignment::{Alignment, Moment, Verdict};
 use super::trouble::Trouble;
 use crate::board::Delivered;
 
-/// Looks at a moment before a read-out that never ends counts as one that does not come: one takes a few µs.
+/// Looks at a moment before a read-out that never ends counts as one that does not come: one takes
+/// a few µs.
 const LOOKS: u32 = 1_000;
 
 /// Reads two rings, block by block.
@@ -24,7 +26,8 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Nothing is read before [`Reader::start`]; scans are missing from `now` on, in the clock's count of periods.
+    /// Nothing is read before [`Reader::start`]; scans are missing from `now` on, in the clock's
+    /// count of periods.
     #[must_use]
     pub fn new(alignment: Alignment, channels: usize, now: u32) -> Self {
         Self { alignment, channels, block: 0, started_at: now, accounted: now }
@@ -41,20 +44,23 @@ impl Reader {
         self.block
     }
 
-    /// The period of the next scan that will be delivered or reported missing, in the clock's count.
+    /// The period of the next scan that will be delivered or reported missing, in the clock's
+    /// count.
     #[must_use]
     pub fn next_period(&self) -> u32 {
         self.accounted
     }
 
-    /// Takes the block that is due from the rings' own memory; `look` reads a moment off, with the clock's own count of periods. It is
-    /// called after the block was read, so that a block is proven not to have been overwritten meanwhile. Good scans are
-    /// written to `scans`, which hold nothing of worth after an error.
+    /// Takes the block that is due from the rings' own memory; `look` reads a moment off, with the
+    /// clock's own count of periods. It is called after the block was read, so that a block is
+    /// proven not to have been overwritten meanwhile. Good scans are written to `scans`, which hold
+    /// nothing of worth after an error.
     ///
     /// A wrong CRC ends the block there, and is told besides.
     ///
     /// # Errors
-    /// [`Trouble::Slipped`] or [`Trouble::Overrun`]: nothing of the block can be trusted, and the rings must be started anew.
+    /// [`Trouble::Slipped`] or [`Trouble::Overrun`]: nothing of the block can be trusted, and the
+    /// rings must be started anew.
     pub fn take(
         &mut self,
         [first, second]: [&[[u8; CHIP_BYTES]]; 2],

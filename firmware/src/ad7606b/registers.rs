@@ -16,8 +16,8 @@ pub const CONFIG: u8 = 0x02;
 /// Where the number of lines stands in CONFIG.
 pub const LINES_SHIFT: u8 = 3;
 
-/// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is the lower
-/// half.
+/// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is
+/// the lower half.
 pub const RANGE_CH1_CH2: u8 = 0x03;
 /// One bit a channel: 1 passes 220 kHz (AD7606C only).
 pub const BANDWIDTH: u8 = 0x07;

@@ -7,11 +7,13 @@ use crate::sentence::{Sentence, Tell};
 /// A front end's trouble. The scans that it cost are reported as a lost range besides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// No block came: blocks that each converter had sent. BUSY does not fall, or nothing starts the read-out.
+    /// No block came: blocks that each converter had sent. BUSY does not fall, or nothing starts
+    /// the read-out.
     Silent(u32, u32),
     /// A scan's CRC is wrong.
     Crc,
-    /// The converters are out of step with their clock: words by which each is behind it, negative when ahead (9 are a scan).
+    /// The converters are out of step with their clock: words by which each is behind it, negative
+    /// when ahead (9 are a scan).
     Slipped(i32, i32),
     /// The reader was too late for the rings.
     Overrun,

@@ -23,7 +23,8 @@ pub enum Speed {
 }
 
 impl Speed {
-    /// Bytes of a bulk packet; at either speed no other size is legal for what we need (USB 2.0, 5.8.3).
+    /// Bytes of a bulk packet; at either speed no other size is legal for what we need (USB 2.0,
+    /// 5.8.3).
     #[must_use]
     pub const fn bulk_packet(self) -> u16 {
         match self {

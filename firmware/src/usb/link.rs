@@ -125,8 +125,8 @@ impl<P: Incoming> Inlet<P> {
         Self { pipe, enabled: false, fresh: false, bytes: [0; PACKET] }
     }
 
-    /// The length of the next packet that is not empty, or `None` once when the way was cut. It may be dropped
-    /// while it waits: a packet is taken in one step or not at all.
+    /// The length of the next packet that is not empty, or `None` once when the way was cut. It may
+    /// be dropped while it waits: a packet is taken in one step or not at all.
     async fn next(&mut self) -> Option<usize> {
         loop {
             if !self.enabled {
@@ -205,7 +205,8 @@ impl<'d, D: Driver<'d>> ByteSource for Source<'d, D> {
                 Either3::First(came) => (Way::Vendor, came),
                 Either3::Second(came) => (Way::SerialPort, came),
                 Either3::Third(()) => {
-                    // a host that sleeps, or whose cable was pulled, takes back no order: as good as cut
+                    // a host that sleeps, or whose cable was pulled, takes back no order: as good
+                    // as cut
                     if self.choice.get().is_none() {
                         continue;
                     }
@@ -230,7 +231,8 @@ impl<'d, D: Driver<'d>> ByteSource for Source<'d, D> {
             if before.is_none() {
                 return self.hand_over(held, buffer);
             }
-            // the host has changed its mind: half a frame that came the other way is no part of this one
+            // the host has changed its mind: half a frame that came the other way is no part of
+            // this one
             self.held = Some(held);
             return 0;
         }
@@ -260,7 +262,8 @@ async fn send(pipe: &mut impl Outgoing, frame: &[u8]) {
         }
     }
     if frame.len().is_multiple_of(packet_bytes) {
-        // only a short packet ends what a host reads; the way being cut right here takes nothing from the frame
+        // only a short packet ends what a host reads; the way being cut right here takes nothing
+        // from the frame
         let _ = pipe.packet(&[]).await;
     }
 }

@@ -1,12 +1,16 @@
 //! What the driver of this USB core does not do yet, done around it.
 //!
-//! embassy-usb-synopsys-otg 0.3.3, the version that embassy-stm32 0.6.0 takes, has three faults that were mended after its last release
-//! (embassy pull request 6687, August 2026; docs/dependencies.md):
+//! embassy-usb-synopsys-otg 0.3.3, the version that embassy-stm32 0.6.0 takes, has three faults
+//! that were mended after its last release (embassy pull request 6687, August 2026;
+//! docs/dependencies.md):
 //!
-//! - A suspend that was latched before a bus reset is told after it, and the device sleeps while the host talks to it.
-//! - An endpoint that is enabled anew goes on with the data toggle it had, where USB 2.0, 9.1.1.5 wants DATA0: the first packet after it is
-//!   taken for a repetition. The same when a halt is cleared (USB 2.0, 9.4.5).
-//! - A packet that waited while its endpoint was disabled is read when that is enabled again: [`super::link`] throws it away.
+//! - A suspend that was latched before a bus reset is told after it, and the device sleeps while
+//!   the host talks to it.
+//! - An endpoint that is enabled anew goes on with the data toggle it had, where USB 2.0, 9.1.1.5
+//!   wants DATA0: the first packet after it is taken for a repetition. The same when a halt is
+//!   cleared (USB 2.0, 9.4.5).
+//! - A packet that waited while its endpoint was disabled is read when that is enabled again:
+//!   [`super::link`] throws it away.
 
 use embassy_usb::driver::{
     Bus, Driver, EndpointAddress, EndpointAllocError, EndpointType, Event, Unsupported,

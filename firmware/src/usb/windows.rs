@@ -1,7 +1,9 @@
-//! What Windows wants to be told: that its own WinUSB serves the vendor interface, and by which GUID a program finds that.
+//! What Windows wants to be told: that its own WinUSB serves the vendor interface, and by which
+//! GUID a program finds that.
 //!
-//! Bytes that never change, as "Microsoft OS 2.0 Descriptors Specification" has them (July 2018, tables 3 to 15). The builder that
-//! embassy-usb has for them puts them together on the controller, in 1.7 kB of flash.
+//! Bytes that never change, as "Microsoft OS 2.0 Descriptors Specification" has them (July 2018,
+//! tables 3 to 15). The builder that embassy-usb has for them puts them together on the controller,
+//! in 1.7 kB of flash.
 
 use embassy_usb::Handler;
 use embassy_usb::control::{InResponse, Recipient, Request, RequestType};
@@ -25,7 +27,8 @@ const SET: usize = 10 + 8 + FUNCTION;
 
 /// bDevCapabilityType of a platform capability.
 pub const PLATFORM: u8 = 5;
-/// The platform capability that names the set: its UUID, the version, the set's length, and [`VENDOR_CODE`].
+/// The platform capability that names the set: its UUID, the version, the set's length, and
+/// [`VENDOR_CODE`].
 pub const CAPABILITY: [u8; 25] = [
     0,
     0xDF,
@@ -43,11 +46,11 @@ pub const CAPABILITY: [u8; 25] = [
     0x9E,
     0x64,
     0x8A,
-    0x9F, //
+    0x9F, // 
     WINDOWS_VERSION[0],
     WINDOWS_VERSION[1],
     WINDOWS_VERSION[2],
-    WINDOWS_VERSION[3], //
+    WINDOWS_VERSION[3], // 
     SET as u8,
     0,
     VENDOR_CODE,

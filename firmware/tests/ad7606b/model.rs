@@ -1,5 +1,6 @@
-//! The converter as its data sheet describes it: registers, the two modes of the port, RESET, CONVST and BUSY
-//! with their times, CRCs; and the ways in which it can fail. Time is data: whoever waits moves it.
+//! The converter as its data sheet describes it: registers, the two modes of the port, RESET,
+//! CONVST and BUSY with their times, CRCs; and the ways in which it can fail. Time is data: whoever
+//! waits moves it.
 
 use std::cell::RefCell;
 use std::convert::Infallible;

@@ -1,4 +1,5 @@
-//! The guard chain: currents and times of its optocouplers, what its relays do to them when it opens, what a pulse costs the coil.
+//! The guard chain: currents and times of its optocouplers, what its relays do to them when it
+//! opens, what a pulse costs the coil.
 
 use crate::timing::{LONGEST_PULSE_S, SHORTEST_PAUSE_S};
 
@@ -7,7 +8,8 @@ const CHAIN_V: f64 = 24.0;
 /// Series resistor of each optocoupler, Ω, and its LED's forward voltage, V.
 const SERIES_OHM: f64 = 4.7e3;
 const LED_V: f64 = 1.25;
-/// Least current transfer ratio of rank GB at 5 mA (Toshiba TLP291/TLP293, "Current transfer ratio").
+/// Least current transfer ratio of rank GB at 5 mA (Toshiba TLP291/TLP293, "Current transfer
+/// ratio").
 const TRANSFER: f64 = 1.0;
 /// What the ratio loses over life and temperature.
 const LEFT: f64 = 0.5;
@@ -32,8 +34,9 @@ fn the_optocouplers_reach_their_levels_with_old_leds() {
 
 #[test]
 fn permit_falls_within_the_time_that_first_light_asks_for() {
-    // Saturated, into 1.9 kΩ: the class is stated with 25 µs of storage and 40 µs until off, typically (Broadcom ACPL-214, page 4; Toshiba's sheet
-    // states the same test). Twice that for a hot part, then an RC of load, pin and 10 nF down to 0.3 of the supply.
+    // Saturated, into 1.9 kΩ: the class is stated with 25 µs of storage and 40 µs until off,
+    // typically (Broadcom ACPL-214, page 4; Toshiba's sheet states the same test). Twice that for a
+    // hot part, then an RC of load, pin and 10 nF down to 0.3 of the supply.
     const ASKED_S: f64 = 200e-6;
     let storage_s = 2.0 * (25e-6 + 40e-6);
     let capacitor_f = 10e-9;

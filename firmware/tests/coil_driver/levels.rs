@@ -1,6 +1,7 @@
 //! Whether the levels between the parts fit.
 
-/// Lowest level that a pin at 3.3 V gives for a 1, V: VDD − 0.4 V (STM32U5A5 data sheet, "Output voltage characteristics").
+/// Lowest level that a pin at 3.3 V gives for a 1, V: VDD − 0.4 V (STM32U5A5 data sheet, "Output
+/// voltage characteristics").
 const PIN_HIGH_V: f64 = 3.3 * 0.97 - 0.4;
 /// Highest level of a 0, V.
 const PIN_LOW_V: f64 = 0.4;
@@ -38,6 +39,7 @@ fn pull_downs_hold_against_every_leakage_and_load_no_pin() {
     const { assert!(3e-6 * PULL_DOWN_OHM < 0.1 * HCT.low_v) };
     // a pin gives 8 mA with the levels above
     const { assert!(PIN_HIGH_V / PULL_DOWN_OHM < 0.1 * 8e-3) };
-    // the MOSFET's gate: IRLZ44N, threshold 1 V at least, leakage 100 nA, its driver without supply 10 µA
+    // the MOSFET's gate: IRLZ44N, threshold 1 V at least, leakage 100 nA, its driver without supply
+    // 10 µA
     const { assert!(10.1e-6 * PULL_DOWN_OHM < 0.2) };
 }

@@ -1,5 +1,6 @@
-//! The hammer's coil driver and its guard chain as circuits (docs/WIRING.md): what the gate does for every input at 0, at 1 and with its wire off, how
-//! long a pulse and how short a pause the hardware alone allows, and whether levels, currents and times fit the parts.
+//! The hammer's coil driver and its guard chain as circuits (docs/WIRING.md): what the gate does
+//! for every input at 0, at 1 and with its wire off, how long a pulse and how short a pause the
+//! hardware alone allows, and whether levels, currents and times fit the parts.
 //!
 //! docs/WIRING.md and docs/safety.md hold the tables that these tests make, word for word.
 #![allow(clippy::unwrap_used)]

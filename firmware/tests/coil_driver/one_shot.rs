@@ -1,10 +1,11 @@
 //! One half of a 74HCT4538.
 //!
-//! Nexperia, 74HC4538; 74HCT4538, Rev. 4 (2016): nB is the rising trigger, nA the falling one, a LOW at nCD ends the pulse and forbids triggering
-//! (section 1, "Functional description"), and the pulse lasts 0.7 R C. Unlike a 74HC123 it is not triggered by the end of a reset.
+//! Nexperia, 74HC4538; 74HCT4538, Rev. 4 (2016): nB is the rising trigger, nA the falling one, a
+//! LOW at nCD ends the pulse and forbids triggering (section 1, "Functional description"), and the
+//! pulse lasts 0.7 R C. Unlike a 74HC123 it is not triggered by the end of a reset.
 
-/// By how much a pulse may differ from 0.7 R C. The sheet's output pulse of 0.7 ms (10 kΩ, 0.1 µF) is taken as ± 14 % over temperature,
-/// resistors have 1 %, film capacitors 5 %.
+/// By how much a pulse may differ from 0.7 R C. The sheet's output pulse of 0.7 ms (10 kΩ, 0.1 µF)
+/// is taken as ± 14 % over temperature, resistors have 1 %, film capacitors 5 %.
 pub const TOLERANCE: f64 = 0.14 + 0.01 + 0.05;
 
 /// Nominal length of a pulse, s.

@@ -111,7 +111,8 @@ fn opening_the_guard_ends_a_pulse_and_closing_it_does_not_resume_it() {
     assert!((found[0][1] - 0.012).abs() < 1.5 * STEP_S);
 }
 
-/// A pin gone wild in every way that a seed draws: telegraphs of all speeds at PULSE and PERMIT, wires that come and go.
+/// A pin gone wild in every way that a seed draws: telegraphs of all speeds at PULSE and PERMIT,
+/// wires that come and go.
 #[test]
 fn no_program_makes_a_pulse_longer_or_a_pause_shorter() {
     let mut pulses_seen = 0;

@@ -56,7 +56,8 @@ fn without_its_supply_the_gate_is_off() {
     }
 }
 
-/// The circuit as it was before: neither resistor, PULSE at the one-shot alone. What the table is worth shows where it fails.
+/// The circuit as it was before: neither resistor, PULSE at the one-shot alone. What the table is
+/// worth shows where it fails.
 #[test]
 fn each_pull_down_is_needed() {
     for (pulse, permit) in [(false, true), (true, false)] {

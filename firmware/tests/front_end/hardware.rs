@@ -1,5 +1,6 @@
-//! Register model of what reads two converters without the CPU: the clock of CONVST with its count of periods, either chip's BUSY,
-//! a port that must be switched off and on between two transfers, and a DMA channel that writes its ring.
+//! Register model of what reads two converters without the CPU: the clock of CONVST with its count
+//! of periods, either chip's BUSY, a port that must be switched off and on between two transfers,
+//! and a DMA channel that writes its ring.
 
 use jointrig_firmware::ad7606b::alignment::{Clock, Moment, SCAN_WORDS};
 use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc};

@@ -1,5 +1,6 @@
-//! Two converters that are read without the CPU: slips of every kind, a program that looks at any time, and ports that need a restart,
-//! against a model of the registers; and the timing of a bit on its way, from the datasheets.
+//! Two converters that are read without the CPU: slips of every kind, a program that looks at any
+//! time, and ports that need a restart, against a model of the registers; and the timing of a bit
+//! on its way, from the datasheets.
 
 mod hardware;
 mod noise;
@@ -16,8 +17,8 @@ fn alignment() -> Alignment {
     Alignment { clock: CLOCK, block_scans: BLOCK_SCANS as u32, blocks: BLOCKS as u32 }
 }
 
-/// Reads until trouble or until so many blocks have come, each time as many counts late as `late` says. Every scan that is
-/// delivered is held to what was converted. What came, and how it ended.
+/// Reads until trouble or until so many blocks have come, each time as many counts late as `late`
+/// says. Every scan that is delivered is held to what was converted. What came, and how it ended.
 fn read(hardware: &mut Hardware, blocks: u32, mut late: impl FnMut(u32) -> u64) -> (u64, Option<Trouble>) {
     let mut reader = Reader::new(alignment(), CHANNELS, 0);
     reader.start(0);
@@ -115,7 +116,8 @@ fn without_a_restart_the_ports_read_once_and_never_again() {
 
 #[test]
 fn counts_may_wrap() {
-    // after a day the count of periods comes round; blocks are a power of two in the ring, so the count of blocks may
+    // after a day the count of periods comes round; blocks are a power of two in the ring, so the
+    // count of blocks may
     let number = u32::MAX - 2;
     let begin = number.wrapping_mul(BLOCK_SCANS as u32);
     let words =

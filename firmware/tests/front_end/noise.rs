@@ -9,8 +9,8 @@ const PEAK_N: f64 = 50.0;
 /// Codes of 16 bits.
 const CODES: f64 = 65_536.0;
 
-/// Part, range in V, and typical signal to noise at full scale in dB without averaging: from memory of AD7606B Rev. 0 and AD7606C-16 Rev. 0, "Specifications",
-/// not checked against them.
+/// Part, range in V, and typical signal to noise at full scale in dB without averaging: from memory
+/// of AD7606B Rev. 0 and AD7606C-16 Rev. 0, "Specifications", not checked against them.
 const CONVERTERS: [(&str, f64, f64); 6] = [
     ("AD7606B", 10.0, 90.0),
     ("AD7606B", 5.0, 89.0),
@@ -20,7 +20,8 @@ const CONVERTERS: [(&str, f64, f64); 6] = [
     ("AD7606C-16", 2.5, 88.0),
 ];
 
-/// Sensors, and the noise of their own in codes of ± 10 V (`hil-sim/rigs/default.toml`, over the whole band).
+/// Sensors, and the noise of their own in codes of ± 10 V (`hil-sim/rigs/default.toml`, over the
+/// whole band).
 const SENSORS: [(&str, f64); 4] = [
     ("hammer's force cell", 0.7),
     ("load cell", 1.6),

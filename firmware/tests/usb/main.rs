@@ -390,7 +390,8 @@ fn a_packet_from_before_a_reset_is_no_order_after_it() {
         let way = host.enumerate().await.vendor();
         host.put(way.out, b"first").await.unwrap();
         settle().await;
-        // it arrives together with the reset, and waits in the driver until the endpoint is enabled again
+        // it arrives together with the reset, and waits in the driver until the endpoint is enabled
+        // again
         host.put(way.out, b"stale").await.unwrap();
         host.reset().await;
         let way = host.enumerate().await.vendor();

@@ -1,16 +1,17 @@
 //! `memcpy` for the Cortex-M33.
 //!
-//! Rust's own is portable and takes four instructions a word; every block of samples is copied four times
-//! on its way. This one moves eight words in two instructions when both sides are aligned, and uses the
-//! core's unaligned loads and stores when they are not. A board brings it in by naming this crate.
+//! Rust's own is portable and takes four instructions a word; every block of samples is copied four
+//! times on its way. This one moves eight words in two instructions when both sides are aligned,
+//! and uses the core's unaligned loads and stores when they are not. A board brings it in by naming
+//! this crate.
 #![no_std]
 
 use core::arch::global_asm;
 
 // The linker prefers these definitions to the weak ones of the compiler's library. They follow the
 // procedure call standard: r0 to r3 and r12 are free, all else is restored; `memcpy` returns r0.
-// Loads and stores of single words and halves may be unaligned on this core; multiple ones may not, and
-// are used only when both addresses are multiples of four.
+// Loads and stores of single words and halves may be unaligned on this core; multiple ones may not,
+// and are used only when both addresses are multiples of four.
 global_asm!(
     ".section .text.memcpy,\"ax\",%progbits",
     ".global memcpy",

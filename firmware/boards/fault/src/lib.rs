@@ -5,7 +5,8 @@ use cortex_m::peripheral::SCB;
 use cortex_m::register::msplim;
 use jointrig_firmware::processor_fault::Status;
 
-/// Stack that is kept for the fault handler, bytes: formatting its sentence takes about a quarter of it.
+/// Stack that is kept for the fault handler, bytes: formatting its sentence takes about a quarter
+/// of it.
 const RESERVE: u32 = 4096;
 
 /// CCR.STKOFHFNMIGN: the limit does not hold in the hard fault's own handler (Armv8-M ARM, "CCR").
@@ -18,14 +19,16 @@ unsafe extern "C" {
 
 /// From here on a stack that grows into other memory is a fault instead of other memory's end.
 ///
-/// The fault is told when its own frame (up to 104 bytes) still fits above the limit; otherwise the processor locks up, as the architecture has it, and
-/// what stands behind it must act: the watchdog, and on boards that have one the timer break of the locked-up core.
+/// The fault is told when its own frame (up to 104 bytes) still fits above the limit; otherwise the
+/// processor locks up, as the architecture has it, and what stands behind it must act: the
+/// watchdog, and on boards that have one the timer break of the locked-up core.
 pub fn limit_stack() {
     let lowest = (&raw const _stack_end).addr() as u32;
     // the register's three lowest bits are zero
     let limit = (lowest + RESERVE + 7) & !7;
-    // SAFETY: the limit lies within the stack's own memory, below the stack pointer of `main`; the bit of CCR concerns handlers above all priorities
-    // only, and nothing else writes the register now.
+    // SAFETY: the limit lies within the stack's own memory, below the stack pointer of `main`; the
+    // bit of CCR concerns handlers above all priorities only, and nothing else writes the register
+    // now.
     unsafe {
         (*SCB::PTR).ccr.modify(|ccr| ccr | HANDLER_MAY_USE_RESERVE);
         msplim::write(limit);

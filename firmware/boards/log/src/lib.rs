@@ -1,12 +1,12 @@
 //! The logger of a board: each line is encoded once, and goes whole to two places.
 //!
-//! One is [`TAP`], from which the firmware's transmitter takes lines for the host; the other is whatever the
-//! board names in [`also_to`] (a debug probe, the simulator's memory). A line is gathered in full before it is
-//! handed over, so that neither ever sees half of one, and one that is longer than a frame of the link is
-//! dropped by both.
+//! One is [`TAP`], from which the firmware's transmitter takes lines for the host; the other is
+//! whatever the board names in [`also_to`] (a debug probe, the simulator's memory). A line is
+//! gathered in full before it is handed over, so that neither ever sees half of one, and one that
+//! is longer than a frame of the link is dropped by both.
 //!
-//! Interrupts are off while a line is put together, as with any defmt logger on one core: about a thousand
-//! instructions for a line, none without one.
+//! Interrupts are off while a line is put together, as with any defmt logger on one core: about a
+//! thousand instructions for a line, none without one.
 #![no_std]
 
 use core::cell::{Cell, RefCell};
@@ -29,15 +29,16 @@ pub fn also_to(place: Place) {
     critical_section::with(|free| ALSO.borrow(free).set(Some(place)));
 }
 
-/// The build id of this image: the first eight bytes of the hash that the linker wrote into it. A host finds
-/// the table of log strings by it.
+/// The build id of this image: the first eight bytes of the hash that the linker wrote into it. A
+/// host finds the table of log strings by it.
 #[must_use]
 pub fn build_id() -> u64 {
     unsafe extern "C" {
         static __jointrig_build_id: [u8; 24];
     }
-    // SAFETY: build-id.x, with which every board links, puts the symbol where the linker's note begins: a
-    // header of 16 bytes, and then the 20 of a SHA-1. It lies in flash, and nothing writes there.
+    // SAFETY: build-id.x, with which every board links, puts the symbol where the linker's note
+    // begins: a header of 16 bytes, and then the 20 of a SHA-1. It lies in flash, and nothing
+    // writes there.
     let note = unsafe { &__jointrig_build_id };
     let [.., a, b, c, d, e, f, g, h] = *note;
     u64::from_be_bytes([a, b, c, d, e, f, g, h])
@@ -84,11 +85,13 @@ impl Line {
 #[defmt::global_logger]
 struct Logger;
 
-// SAFETY: `acquire` turns interrupts off on the one core and `release` restores them, so that nobody else logs
-// between the two; a line begun inside another one (by a `Format` that logs) panics.
+// SAFETY: `acquire` turns interrupts off on the one core and `release` restores them, so that
+// nobody else logs between the two; a line begun inside another one (by a `Format` that logs)
+// panics.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        // SAFETY: released by `release`, which defmt calls after every `acquire`, nested as it was acquired.
+        // SAFETY: released by `release`, which defmt calls after every `acquire`, nested as it was
+        // acquired.
         let before = unsafe { critical_section::acquire() };
         critical_section::with(|free| {
             let mut line = LINE.borrow_ref_mut(free);

@@ -1,4 +1,5 @@
-//! Running the tasks: embassy's executor, and a turn to whoever serves the board when all of them wait.
+//! Running the tasks: embassy's executor, and a turn to whoever serves the board when all of them
+//! wait.
 
 use core::ptr;
 use core::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,5 @@
-//! The ends that are not meant to happen: a panic or a processor fault is reported, and QEMU ends with 101.
+//! The ends that are not meant to happen: a panic or a processor fault is reported, and QEMU ends
+//! with 101.
 
 use core::fmt::Write;
 use core::panic::PanicInfo;
@@ -52,10 +53,12 @@ fn read_nowhere() {
     let _ = unsafe { core::ptr::read_volatile(0x7000_0000 as *const u32) };
 }
 
-/// For tests: calls itself until little of the stack is left, then a function that needs more than that.
+/// For tests: calls itself until little of the stack is left, then a function that needs more than
+/// that.
 #[inline(never)]
 fn recurse(depth: u32) -> u32 {
-    /// More than the frame of a fault, so that the handler can begin; less than what [`greedy`] takes.
+    /// More than the frame of a fault, so that the handler can begin; less than what [`greedy`]
+    /// takes.
     const LEFT: usize = 6 * 1024;
     let frame = core::hint::black_box([depth; 256]);
     let here = (&raw const frame).addr();

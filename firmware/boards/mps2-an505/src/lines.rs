@@ -1,6 +1,8 @@
-//! Log lines for the simulator: encoded, in a ring of the shared memory, dropped whole when it is full.
+//! Log lines for the simulator: encoded, in a ring of the shared memory, dropped whole when it is
+//! full.
 //!
-//! They reach it at the next turn, whatever the link does: what is said before a host comes and before a panic.
+//! They reach it at the next turn, whatever the link does: what is said before a host comes and
+//! before a panic.
 
 use jointrig_firmware::lockstep::{LOG_AT, RING_BYTES};
 

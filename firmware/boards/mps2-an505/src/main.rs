@@ -1,5 +1,5 @@
-//! The board: the firmware for a simulator, which starts QEMU itself. The image's arguments are `serve` and, for a link
-//! over UART 0, `uart`.
+//! The board: the firmware for a simulator, which starts QEMU itself. The image's arguments are
+//! `serve` and, for a link over UART 0, `uart`.
 #![no_std]
 #![no_main]
 

@@ -19,9 +19,10 @@ pub fn is_served() -> bool {
 /// Outside the shared memory.
 pub fn read(at: usize, out: &mut [u8]) {
     assert!(at <= BYTES && out.len() <= BYTES - at, "outside the shared memory");
-    // SAFETY: the range lies within the 16 MB at BASE, which is plain memory of this machine, aligned for
-    // bytes and disjoint from all that the linker placed, so no Rust object is there. The simulator writes
-    // only while this core stands still in a semihosting call, which the compiler must assume to touch it.
+    // SAFETY: the range lies within the 16 MB at BASE, which is plain memory of this machine,
+    // aligned for bytes and disjoint from all that the linker placed, so no Rust object is there.
+    // The simulator writes only while this core stands still in a semihosting call, which the
+    // compiler must assume to touch it.
     unsafe { ptr::copy_nonoverlapping((BASE + at) as *const u8, out.as_mut_ptr(), out.len()) }
 }
 

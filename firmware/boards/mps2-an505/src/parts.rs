@@ -49,7 +49,8 @@ pub struct Scans {
     reader: Reader,
     per_block: usize,
     rate_hz: u32,
-    /// The instant at which the block that is due is complete: µs, and a part of one more in parts of the scan rate.
+    /// The instant at which the block that is due is complete: µs, and a part of one more in parts
+    /// of the scan rate.
     due: (u64, u32),
     blocks: u32,
     /// The rings are to be started.
@@ -98,7 +99,8 @@ impl Scans {
         .await
     }
 
-    /// By how many scans what was delivered or reported missing is behind the clock, as a number to be added to what is told from there.
+    /// By how many scans what was delivered or reported missing is behind the clock, as a number to
+    /// be added to what is told from there.
     fn behind(&self) -> i32 {
         self.reader.next_period().wrapping_sub(self.periods).cast_signed()
     }

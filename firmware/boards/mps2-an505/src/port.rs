@@ -93,7 +93,8 @@ pub fn idle(alarm_us: u64) {
     crate::time::set(now_us);
 }
 
-/// Serves by the simulator: a byte on the standard output rings, a byte on the standard input answers.
+/// Serves by the simulator: a byte on the standard output rings, a byte on the standard input
+/// answers.
 pub fn simulator(ask: &Ask) -> Reply {
     static PIPES: Mutex<CriticalSectionRawMutex, RefCell<Option<(Stdin, Stdout)>>> =
         Mutex::new(RefCell::new(None));

@@ -1,7 +1,7 @@
 //! The plain way to the host: UART 0 of the board, byte by byte.
 //!
-//! QEMU connects it to whatever its `-serial` names. Bytes then come in the host's time, not in the simulator's, so a
-//! run over it is not repeatable; the shared ring is for that.
+//! QEMU connects it to whatever its `-serial` names. Bytes then come in the host's time, not in the
+//! simulator's, so a run over it is not repeatable; the shared ring is for that.
 
 use core::ptr;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -20,7 +20,8 @@ const FULL_IN: u32 = 2;
 const BOTH_ON: u32 = 3;
 /// The smallest divisor: QEMU sends at once whatever it is.
 const FASTEST: u32 = 16;
-/// Looks at STATE before an empty line is believed: QEMU brings the next byte a moment after the last was taken.
+/// Looks at STATE before an empty line is believed: QEMU brings the next byte a moment after the
+/// last was taken.
 const LOOKS: u32 = 64;
 
 static IN_USE: AtomicBool = AtomicBool::new(false);

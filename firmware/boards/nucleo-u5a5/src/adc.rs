@@ -1,7 +1,7 @@
 //! ADC1 for a handful of slow values: one conversion at a time, asked for by software, waited for.
 //!
-//! By its registers (RM0456, "Analog-to-digital converter (ADC1 and ADC2)"), in the order that embassy-stm32's driver has them: that driver
-//! costs 2 kB of flash here.
+//! By its registers (RM0456, "Analog-to-digital converter (ADC1 and ADC2)"), in the order that
+//! embassy-stm32's driver has them: that driver costs 2 kB of flash here.
 
 use embassy_stm32::Peri;
 use embassy_stm32::pac::adc::vals::{Pcsel, SampleTime};
@@ -10,7 +10,8 @@ use embassy_stm32::pac::{ADC1, ADC12_COMMON, RCC};
 use embassy_stm32::peripherals;
 use embassy_time::Timer;
 
-/// The regulator's start-up, µs: 10 in embassy-stm32; the datasheet's figure was not looked up, and nothing is in haste.
+/// The regulator's start-up, µs: 10 in embassy-stm32; the datasheet's figure was not looked up, and
+/// nothing is in haste.
 const REGULATOR_US: u64 = 100;
 
 /// The converter, ready, and the pins that are its own.
@@ -20,7 +21,8 @@ pub struct Adc<P> {
 }
 
 impl<P> Adc<P> {
-    /// Starts and calibrates it for these inputs (their numbers: ADC1_IN…, whose pins are analog after a reset).
+    /// Starts and calibrates it for these inputs (their numbers: ADC1_IN…, whose pins are analog
+    /// after a reset).
     pub async fn new(adc: Peri<'static, peripherals::ADC1>, pins: P, inputs: &[u8]) -> Self {
         critical_section::with(|_| RCC.ahb2enr1().modify(|w| w.set_adc12en(true)));
         // of the bus's 160 MHz; 55 MHz is the most that it may have

@@ -8,7 +8,8 @@ use static_cell::StaticCell;
 
 use crate::chips::SETTINGS;
 
-/// One input: name, role, quantity, SI units per volt (sign included), delay of the sensor's electronics in ns.
+/// One input: name, role, quantity, SI units per volt (sign included), delay of the sensor's
+/// electronics in ns.
 type Input = (&'static str, Role, Quantity, f32, u32);
 
 /// Place of the hammer's force.
@@ -36,8 +37,8 @@ const INPUTS: [Input; MAX_CHANNELS] = [
     ("aux_16", Role::Auxiliary, Quantity::Voltage, 1.0, 0),
 ];
 
-/// A filter that follows the range would let channels of different ranges lag by different times (docs/front-end.md), of which
-/// nothing here tells the host.
+/// A filter that follows the range would let channels of different ranges lag by different times
+/// (docs/front-end.md), of which nothing here tells the host.
 const _: () = {
     let mut place = 1;
     while place < SETTINGS.ranges.len() {

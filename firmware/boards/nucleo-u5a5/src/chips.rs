@@ -20,9 +20,9 @@ use embedded_hal::spi::{ErrorType as SpiErrorType, Operation, SpiBus, SpiDevice}
 use jointrig_firmware::ad7606b::part::{AD7606B, Lines, Oversampling};
 use jointrig_firmware::ad7606b::{CHANNELS, Converter, Error, Range, Settings};
 
-/// How both work. Eight conversions are averaged: 10 µs, which with the read-out of 3.6 µs leaves 5 µs of
-/// the 19.5 µs between two scans. All ranges are
-/// alike, so that all channels have one phase: docs/WIRING.md.
+/// How both work. Eight conversions are averaged: 10 µs, which with the read-out of 3.6 µs leaves 5
+/// µs of the 19.5 µs between two scans. All ranges are alike, so that all channels have one phase:
+/// docs/WIRING.md.
 pub const SETTINGS: Settings = Settings {
     ranges: [Range::Volts10; CHANNELS],
     oversampling: Oversampling::X8,
@@ -218,13 +218,14 @@ where
         set_up(Framed { bus, select }, reset, busy, convst).await
     }
 
-    /// Gives the pins the functions they have while the rings are filled: the port selects and clocks by itself, and
-    /// SDI is low, because anything else would be a command.
+    /// Gives the pins the functions they have while the rings are filled: the port selects and
+    /// clocks by itself, and SDI is low, because anything else would be a command.
     pub fn ready_for_ring(&mut self) {
         let mut config = Config::default();
         config.mode = MODE_2;
         config.gpio_speed = Speed::VeryHigh;
-        // these stay as they are until the next set-up, which makes its own: nothing is undone by dropping
+        // these stay as they are until the next set-up, which makes its own: nothing is undone by
+        // dropping
         forget(Spi::new_blocking_rxonly(
             self.port.reborrow(),
             self.clock.reborrow(),

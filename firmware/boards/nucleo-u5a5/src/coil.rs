@@ -1,17 +1,18 @@
 //! The hammer's coil: TIM1 in one-pulse mode, started by the scans' own timer.
 //!
-//! A pulse is one period of the counter, which stops by itself at its end. The counter has 16 bits and runs at
-//! 8 MHz, so that no period it can be told is longer than 8.2 ms: that is the cap, whatever software does. The break
-//! input (guard and emergency stop in series, low when either is open or the wire is broken) takes the output
-//! away at once and without software, and it stays away until the next order. The settings of the break
-//! and of the pin's idle level are locked until the next reset. Behind all of it the coil driver has a one-shot of its own
+//! A pulse is one period of the counter, which stops by itself at its end. The counter has 16 bits
+//! and runs at 8 MHz, so that no period it can be told is longer than 8.2 ms: that is the cap,
+//! whatever software does. The break input (guard and emergency stop in series, low when either is
+//! open or the wire is broken) takes the output away at once and without software, and it stays
+//! away until the next order. The settings of the break and of the pin's idle level are locked
+//! until the next reset. Behind all of it the coil driver has a one-shot of its own
 //! (docs/WIRING.md).
 //!
-//! TIM2's update, which begins a scan's period, starts the counter (slave mode "trigger"); the output rises when
-//! it has counted 1 µs, with CONVST's edge. The trigger comes with every scan, so it must be heard once only: an order
-//! holds interrupts off until the next update (19.5 µs at most), sees the counter run, and stops listening. Should
-//! the core die between the two, pulses would follow each other: the driver's second one-shot allows none within
-//! half a second.
+//! TIM2's update, which begins a scan's period, starts the counter (slave mode "trigger"); the
+//! output rises when it has counted 1 µs, with CONVST's edge. The trigger comes with every scan, so
+//! it must be heard once only: an order holds interrupts off until the next update (19.5 µs at
+//! most), sees the counter run, and stops listening. Should the core die between the two, pulses
+//! would follow each other: the driver's second one-shot allows none within half a second.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -43,8 +44,8 @@ const _: () = assert!(
 /// TIM1_BKIN on PE15.
 const BREAK_FUNCTION: u8 = 1;
 
-/// Whoever saw danger has taken the output away; only [`Coil::off`] lets a pulse begin again. An order that was on its
-/// way at that moment comes to nothing.
+/// Whoever saw danger has taken the output away; only [`Coil::off`] lets a pulse begin again. An
+/// order that was on its way at that moment comes to nothing.
 static VETOED: AtomicBool = AtomicBool::new(false);
 
 /// Takes the output away from whatever runs. For a task above acquisition, which may be stuck.
@@ -84,13 +85,15 @@ impl PulseTimer {
         });
         // RM0456, "TIM1 internal trigger connection": ITR1 is TIM2's TRGO
         timer.set_trigger_source(TriggerSource::ITR1);
-        // low from 0 to CONVST's edge, high to the end of the period, low again when the counter has stopped at 0
+        // low from 0 to CONVST's edge, high to the end of the period, low again when the counter
+        // has stopped at 0
         timer.set_output_compare_mode(Channel::Ch1, OutputCompareMode::PwmMode2);
         timer.set_output_compare_preload(Channel::Ch1, false);
         timer.set_output_polarity(Channel::Ch1, OutputPolarity::ActiveHigh);
         timer.set_compare_value(Channel::Ch1, BEFORE_EDGE as u16);
         timer.set_max_compare_value(1);
-        // a core that has locked up breaks the pulse too, until the next reset (RM0456, "SYSCFG configuration register 2", CLL)
+        // a core that has locked up breaks the pulse too, until the next reset (RM0456, "SYSCFG
+        // configuration register 2", CLL)
         pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
         timer.set_break_polarity(Bkp::ACTIVE_LOW);
         timer.set_break_filter(FilterValue::FDTS_DIV8_N6);
@@ -108,7 +111,8 @@ impl PulseTimer {
         self.timer.regs_core().cr1().read().cen()
     }
 
-    /// Lets the next update of TIM2 start the counter, and no other. False when none came within two periods.
+    /// Lets the next update of TIM2 start the counter, and no other. False when none came within
+    /// two periods.
     fn start_with_next_scan(&self) -> bool {
         let scans = || pac::TIM5.cnt().read();
         self.timer.set_slave_mode(SlaveMode::TRIGGER_MODE);
@@ -126,7 +130,8 @@ impl Coil for PulseTimer {
 
     fn pulse(&mut self, width_us: u32) {
         if self.runs() {
-            // the pulse before this one has not ended: it will, and this one is not for adding to it
+            // the pulse before this one has not ended: it will, and this one is not for adding to
+            // it
             return;
         }
         let counts = width_us.clamp(1, COIL_PULSE_CAP_US) * COUNTS_PER_US;

@@ -1,16 +1,17 @@
 //! The shaker's drive: DAC1's first output on PA4, one code per scan, in step with CONVST.
 //!
-//! TIM2's update ends a scan's period: it makes the DAC put out the word it holds, and CONVST rises 1 µs later. The
-//! DAC then asks GPDMA channel 2, the player, for the next word of a ring. The same update asks channel 3,
-//! the eraser, which writes rest behind the player ([`jointrig_firmware::feed`]). Neither needs a program: when it
-//! hangs, the ring is at rest after what was given (1.5 ms as a rule, 4.4 ms at most), and stays so.
+//! TIM2's update ends a scan's period: it makes the DAC put out the word it holds, and CONVST rises
+//! 1 µs later. The DAC then asks GPDMA channel 2, the player, for the next word of a ring. The same
+//! update asks channel 3, the eraser, which writes rest behind the player
+//! ([`jointrig_firmware::feed`]). Neither needs a program: when it hangs, the ring is at rest after
+//! what was given (1.5 ms as a rule, 4.4 ms at most), and stays so.
 //!
-//! TIM5, which counts TIM2's updates, is the player's position. The word that the player takes after the n-th update
-//! is put out with the (n+1)-th.
+//! TIM5, which counts TIM2's updates, is the player's position. The word that the player takes
+//! after the n-th update is put out with the (n+1)-th.
 //!
-//! Rest is the middle of the DAC's range. The amplifier sees 0 V then, and also while the pin floats in reset: a
-//! capacitor and a divider to the middle see to that (docs/WIRING.md). PE10 holds the relay that lets the amplifier
-//! hear at all; it is low in reset.
+//! Rest is the middle of the DAC's range. The amplifier sees 0 V then, and also while the pin
+//! floats in reset: a capacitor and a divider to the middle see to that (docs/WIRING.md). PE10
+//! holds the relay that lets the amplifier hear at all; it is low in reset.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering, fence};
@@ -51,7 +52,8 @@ const RING_BYTES: u32 = RING * WORD_BYTES;
 /// What a DMA channel loads to go round again: byte count, address, and the link to this again.
 type Item = [u32; 3];
 
-/// What the DMA reads and writes. Aligned to more than an item's size, so that none crosses a 64 kB page.
+/// What the DMA reads and writes. Aligned to more than an item's size, so that none crosses a 64 kB
+/// page.
 #[repr(C, align(64))]
 struct Shared {
     player: UnsafeCell<Item>,
@@ -60,7 +62,8 @@ struct Shared {
     rest: u32,
 }
 
-/// The ring's words. Zeros until the drive starts, which writes rest everywhere first: so they take no flash.
+/// The ring's words. Zeros until the drive starts, which writes rest everywhere first: so they take
+/// no flash.
 #[repr(C, align(64))]
 struct Ringed(UnsafeCell<[u32; RING as usize]>);
 
@@ -69,9 +72,9 @@ unsafe impl Sync for Ringed {}
 
 static WORDS: Ringed = Ringed(UnsafeCell::new([0; RING as usize]));
 
-// SAFETY: the items are written only while both channels are off, and read only by the DMA. The words are touched
-// by the DMA and, through volatile accesses inside critical sections, by `In`; each is a `u32` of which any value
-// may be played, and the accesses of both sides are whole words.
+// SAFETY: the items are written only while both channels are off, and read only by the DMA. The
+// words are touched by the DMA and, through volatile accesses inside critical sections, by `In`;
+// each is a `u32` of which any value may be played, and the accesses of both sides are whole words.
 unsafe impl Sync for Shared {}
 
 static SHARED: Shared =
@@ -95,8 +98,8 @@ impl Words for In<'_> {
     }
 }
 
-/// Takes the drive away from whatever runs: silence in the ring within 0.1 ms, and the relay falls. For a task
-/// above acquisition, which may be stuck.
+/// Takes the drive away from whatever runs: silence in the ring within 0.1 ms, and the relay falls.
+/// For a task above acquisition, which may be stuck.
 pub fn mute() {
     critical_section::with(|section| {
         pac::GPIOE.bsrr().write(|w| w.set_br(ENABLE_BIT, true));
@@ -169,8 +172,9 @@ impl ShakerDrive {
         });
     }
 
-    /// Whether both channels go round, and the DAC has never waited in vain. A DAC that has asks no more
-    /// (RM0456, "DMA underrun") and keeps its last word: of that the capacitor behind it leaves nothing.
+    /// Whether both channels go round, and the DAC has never waited in vain. A DAC that has asks no
+    /// more (RM0456, "DMA underrun") and keeps its last word: of that the capacitor behind it
+    /// leaves nothing.
     fn works() -> bool {
         dma::works(PLAYER) && dma::works(ERASER) && !pac::DAC1.sr().read().dmaudr(CHANNEL)
     }
@@ -212,8 +216,8 @@ fn prepare_player(request: u8) {
     channel.llr().write_value(ChLlr(link.0));
 }
 
-/// Rest to ring, a word for each of TIM2's updates, [`TRAIL`] words behind the player: the first time only to
-/// the ring's end.
+/// Rest to ring, a word for each of TIM2's updates, [`TRAIL`] words behind the player: the first
+/// time only to the ring's end.
 fn prepare_eraser(request: u8) {
     let ring = WORDS.0.get() as u32;
     let item = SHARED.eraser.get();

@@ -1,12 +1,13 @@
 //! Guard and emergency stop, told when they change instead of once a block.
 //!
-//! EXTI lines 13 and 14 wake a task on an executor of its own, above acquisition: it runs within some
-//! microseconds, also when no blocks come and when acquisition never returns. It takes coil and drive away by itself and
-//! tells the core, which disarms and lets the host hear of it. A core that is locked for ever, or interrupts
-//! that stay off, stop this task too: then TIM1's break has already ended the pulse in hardware, and the watchdog resets.
+//! EXTI lines 13 and 14 wake a task on an executor of its own, above acquisition: it runs within
+//! some microseconds, also when no blocks come and when acquisition never returns. It takes coil
+//! and drive away by itself and tells the core, which disarms and lets the host hear of it. A core
+//! that is locked for ever, or interrupts that stay off, stop this task too: then TIM1's break has
+//! already ended the pulse in hardware, and the watchdog resets.
 //!
-//! These lines' pending bits are cleared here and no other's: embassy's own EXTI handler would clear those of
-//! BUSY as well.
+//! These lines' pending bits are cleared here and no other's: embassy's own EXTI handler would
+//! clear those of BUSY as well.
 
 use core::future::poll_fn;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -54,7 +55,8 @@ fn listen() {
         }
     });
     for number in [interrupt::EXTI13, interrupt::EXTI14] {
-        // SAFETY: their handlers stand above and touch nothing but their own lines, an atomic and a waker.
+        // SAFETY: their handlers stand above and touch nothing but their own lines, an atomic and a
+        // waker.
         unsafe { number.enable() };
     }
 }

@@ -1,8 +1,9 @@
 //! Guard, emergency stop, the key that resets it, and what K1's own contact says of K1.
 //!
-//! The firmware looks at them once a block (every 0.3 ms) and when guard or stop change ([`crate::guard`]); the coil
-//! does not wait for either: guard and stop also act on TIM1's break and on the coil driver's gate. Each input is high when all is well, and pulled down, so
-//! that a broken wire is an open guard and a pressed stop.
+//! The firmware looks at them once a block (every 0.3 ms) and when guard or stop change
+//! ([`crate::guard`]); the coil does not wait for either: guard and stop also act on TIM1's break
+//! and on the coil driver's gate. Each input is high when all is well, and pulled down, so that a
+//! broken wire is an open guard and a pressed stop.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_stm32::Peri;
@@ -16,7 +17,8 @@ use jointrig_firmware::board::Inputs;
 use jointrig_firmware::relay::{Fault, Relay};
 use jointrig_protocol::slow::Slow;
 
-/// Whether K1 was seen to do what it is told; whoever takes the pins' word for the guard asks this too.
+/// Whether K1 was seen to do what it is told; whoever takes the pins' word for the guard asks this
+/// too.
 static RELAY_IS_SOUND: AtomicBool = AtomicBool::new(false);
 
 /// Whether the guard is closed and K1 can be relied on to open.

@@ -1,7 +1,7 @@
 //! What outlives a reset: the last panic's words, and which start of the controller this is.
 //!
-//! Both lie in RAM that start-up code does not touch. After a power cut they are noise, which a check value
-//! tells from a record; after a watchdog's or our own reset they are what was written.
+//! Both lie in RAM that start-up code does not touch. After a power cut they are noise, which a
+//! check value tells from a record; after a watchdog's or our own reset they are what was written.
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
@@ -15,13 +15,14 @@ use jointrig_firmware::sentence::{Sentence, Tell};
 use jointrig_protocol::answer::Reset;
 use jointrig_protocol::limits::SENTENCE_BYTES;
 
-/// Characters of a file's path that a panic keeps: package, version and file of all that are built in.
+/// Characters of a file's path that a panic keeps: package, version and file of all that are built
+/// in.
 const MOST_OF_A_PATH: usize = 60;
 /// Marks a record as one of ours ("JRIG").
 const MAGIC: u32 = 0x4A52_4947;
 
-/// The last words: [`MAGIC`], their length, their bytes and a check sum, all in words. A volatile access to each byte would be an instruction
-/// of its own: as bytes this took 2 kB of flash.
+/// The last words: [`MAGIC`], their length, their bytes and a check sum, all in words. A volatile
+/// access to each byte would be an instruction of its own: as bytes this took 2 kB of flash.
 type Record = [u32; RECORD_WORDS];
 /// Words of a sentence.
 const TEXT_WORDS: usize = SENTENCE_BYTES / 4;
@@ -52,8 +53,8 @@ pub struct Start {
     pub boot: u32,
 }
 
-// SAFETY of the section: both are plain numbers, of which any bytes are a value; nothing reads them as
-// initialised before they were checked.
+// SAFETY of the section: both are plain numbers, of which any bytes are a value; nothing reads them
+// as initialised before they were checked.
 #[unsafe(link_section = ".uninit.jointrig_panic")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 #[unsafe(link_section = ".uninit.jointrig_starts")]
@@ -71,8 +72,9 @@ pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
     let mut record = [0; RECORD_WORDS];
     let kept = addr_of_mut!(RECORD).cast::<u32>();
     for (place, word) in record.iter_mut().enumerate() {
-        // SAFETY: called first of all in `main`, before any task or interrupt that could panic runs; the volatile
-        // read takes whatever is there, inside the record, and any bytes are a word.
+        // SAFETY: called first of all in `main`, before any task or interrupt that could panic
+        // runs; the volatile read takes whatever is there, inside the record, and any bytes are a
+        // word.
         *word = unsafe { kept.add(place).read_volatile() };
     }
     // SAFETY: as above; a record is told once.
@@ -84,8 +86,9 @@ pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
     String::from_utf8(words.take(record[1] as usize).collect()).ok()
 }
 
-/// Why this start is, once: the flags are cleared, so that the next start tells its own (RM0456, "RCC control/status register",
-/// `RCC_CSR`). A watchdog and a reset by software pull the pin too, so the pin alone counts only without them.
+/// Why this start is, once: the flags are cleared, so that the next start tells its own (RM0456,
+/// "RCC control/status register", `RCC_CSR`). A watchdog and a reset by software pull the pin too,
+/// so the pin alone counts only without them.
 pub fn take_reset() -> Reset {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
@@ -94,7 +97,8 @@ pub fn take_reset() -> Reset {
     } else if flags.sftrstf() {
         Reset::Software
     } else if flags.borrstf() {
-        // set by power coming and by a supply that sags: the count of starts outlives the second only
+        // set by power coming and by a supply that sags: the count of starts outlives the second
+        // only
         if has_counted() { Reset::Brownout } else { Reset::Power }
     } else if flags.pinrstf() {
         Reset::Pin
@@ -112,7 +116,8 @@ fn has_counted() -> bool {
 
 /// Counts this start; `draw` gives the first number after power came.
 pub fn count_start(draw: impl FnOnce() -> u32) -> Start {
-    // SAFETY: called once in `main` before any task runs, and no interrupt uses it; any bytes are a `Starts`.
+    // SAFETY: called once in `main` before any task runs, and no interrupt uses it; any bytes are a
+    // `Starts`.
     let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
     let (count, first) = if before.sum == before.due_sum() {
         (before.count.wrapping_add(1), before.first)
@@ -138,15 +143,16 @@ fn end(what: &Sentence) -> ! {
     }
     record[RECORD_WORDS - 1] = sum_of(&record);
     for (place, word) in record.iter().enumerate() {
-        // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the record; inside it.
+        // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the
+        // record; inside it.
         unsafe { addr_of_mut!(RECORD).cast::<u32>().add(place).write_volatile(*word) };
     }
     cortex_m::asm::dsb();
     SCB::sys_reset()
 }
 
-/// File and line, and the message where it needs no formatting: the code that formats numbers would cost 5 kB of flash, and the line says
-/// which number was meant.
+/// File and line, and the message where it needs no formatting: the code that formats numbers would
+/// cost 5 kB of flash, and the line says which number was meant.
 #[panic_handler]
 fn panicked(info: &PanicInfo<'_>) -> ! {
     let mut sentence = Sentence::default();

@@ -1,4 +1,5 @@
-//! Three lights on the board: green beats while the program runs, blue while scans come, red after a fault.
+//! Three lights on the board: green beats while the program runs, blue while scans come, red after
+//! a fault.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,7 +1,8 @@
-//! The rig's controller: a NUCLEO-U5A5ZJ-Q with two AD7606B, the hammer's coil and a high-speed USB.
+//! The rig's controller: a NUCLEO-U5A5ZJ-Q with two AD7606B, the hammer's coil and a high-speed
+//! USB.
 //!
-//! This crate is wiring; what the instrument does is `jointrig-firmware`. Pins: docs/WIRING.md. What has not
-//! yet been seen on a real board: docs/first-light.md.
+//! This crate is wiring; what the instrument does is `jointrig-firmware`. Pins: docs/WIRING.md.
+//! What has not yet been seen on a real board: docs/first-light.md.
 //!
 //! Timing does not depend on software:
 //!
@@ -18,8 +19,8 @@
 //! | guard and emergency stop | TIM1's break input, and the coil driver's own gate |
 //! | a program that hangs | the independent watchdog ([`watchdog`]) |
 //!
-//! Three executors: guard and emergency stop ([`guard`]) above acquisition, acquisition above USB, watch and lights in
-//! thread mode.
+//! Three executors: guard and emergency stop ([`guard`]) above acquisition, acquisition above USB,
+//! watch and lights in thread mode.
 #![no_std]
 #![no_main]
 
@@ -91,7 +92,8 @@ static TOP: InterruptExecutor = InterruptExecutor::new();
 /// A vector that nothing else uses serves as acquisition's software interrupt.
 #[embassy_stm32::interrupt]
 fn LPUART1() {
-    // SAFETY: only this interrupt polls the executor, and it was started before the interrupt was enabled.
+    // SAFETY: only this interrupt polls the executor, and it was started before the interrupt was
+    // enabled.
     unsafe { ABOVE.on_interrupt() }
 }
 

@@ -1,9 +1,10 @@
 //! The ports off and on again before each conversion, without the CPU.
 //!
-//! A port that has sent its count of words starts no further transfer, whatever triggers it, until it was switched off and on (RM0456, SPI
-//! "Procedure for disabling the SPI"; AN5543). So TIM2 asks a DMA channel of each port's own, shortly before CONVST rises, for
-//! two words into CR1: nothing, and SPE. By then the last read-out is over, and the next begins 10 µs later. The two
-//! channels have a request each, because one must not drive two (RM0456, "GPDMA request selection").
+//! A port that has sent its count of words starts no further transfer, whatever triggers it, until
+//! it was switched off and on (RM0456, SPI "Procedure for disabling the SPI"; AN5543). So TIM2 asks
+//! a DMA channel of each port's own, shortly before CONVST rises, for two words into CR1: nothing,
+//! and SPE. By then the last read-out is over, and the next begins 10 µs later. The two channels
+//! have a request each, because one must not drive two (RM0456, "GPDMA request selection").
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
@@ -19,9 +20,11 @@ use crate::scans::CONVST_LOW;
 
 /// The DMA channel of either port.
 const CHANNELS: [usize; 2] = [4, 5];
-/// Their requests: TIM2's compare channels 2 and 3 (RM0456, "GPDMA1 request assignments"; the same numbers in embassy-stm32's tables).
+/// Their requests: TIM2's compare channels 2 and 3 (RM0456, "GPDMA1 request assignments"; the same
+/// numbers in embassy-stm32's tables).
 const REQUESTS: [u8; 2] = [57, 58];
-/// Counts of TIM2 at which they come: after the period's begin, before CONVST's edge, and not both at once.
+/// Counts of TIM2 at which they come: after the period's begin, before CONVST's edge, and not both
+/// at once.
 const AT: [u32; 2] = [CONVST_LOW / 4, CONVST_LOW / 2];
 /// Bytes of the two words.
 const BYTES: u32 = 8;

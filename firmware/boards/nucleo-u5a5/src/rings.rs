@@ -1,14 +1,16 @@
-//! From converter to memory without software: BUSY's falling edge starts the serial port, the port's words go
-//! to a ring by GPDMA, block after block, round and round.
+//! From converter to memory without software: BUSY's falling edge starts the serial port, the
+//! port's words go to a ring by GPDMA, block after block, round and round.
 //!
-//! The port works in its autonomous mode (RM0456, "SPI autonomous mode"): an edge of EXTI line 4 or 9 starts a transfer
-//! of nine words, with the select pin driven by the port. Before each conversion a second DMA channel switches the port off
-//! and on, without which it would start no further transfer ([`crate::restart`]). The first follows a closed list of blocks
-//! ([`BLOCKS`]) and interrupts once per block, every 0.29 ms; what an interrupt does is count, and nothing but waking rests on
-//! that: whether a block is whole, in step and not overwritten says the channel's own address ([`Ring::position`]).
+//! The port works in its autonomous mode (RM0456, "SPI autonomous mode"): an edge of EXTI line 4 or
+//! 9 starts a transfer of nine words, with the select pin driven by the port. Before each
+//! conversion a second DMA channel switches the port off and on, without which it would start no
+//! further transfer ([`crate::restart`]). The first follows a closed list of blocks ([`BLOCKS`])
+//! and interrupts once per block, every 0.29 ms; what an interrupt does is count, and nothing but
+//! waking rests on that: whether a block is whole, in step and not overwritten says the channel's
+//! own address ([`Ring::position`]).
 //!
-//! embassy-stm32 0.6.0 has a ring of its own; this one is smaller, never moves, and does not share its known
-//! faults.
+//! embassy-stm32 0.6.0 has a ring of its own; this one is smaller, never moves, and does not share
+//! its known faults.
 
 use core::cell::UnsafeCell;
 use core::future::poll_fn;
@@ -51,7 +53,8 @@ static MEMORY: [Memory; 2] =
 /// What the DMA loads to go on with the next block: byte count, destination, and the item after it.
 type Item = [u32; 3];
 
-/// Aligned to more than its size, so that it never crosses a 64 kB page, within which its addresses are.
+/// Aligned to more than its size, so that it never crosses a 64 kB page, within which its addresses
+/// are.
 #[repr(C, align(128))]
 struct Items(UnsafeCell<[Item; BLOCKS as usize]>);
 
@@ -64,7 +67,8 @@ static ITEMS: [Items; 2] = [const { Items(UnsafeCell::new([[0; 3]; BLOCKS as usi
 pub struct Ring {
     port: Spi,
     channel: usize,
-    /// Which trigger of the port BUSY's line is (RM0456, SPI trigger table): 4 for EXTI 4, 5 for EXTI 9.
+    /// Which trigger of the port BUSY's line is (RM0456, SPI trigger table): 4 for EXTI 4, 5 for
+    /// EXTI 9.
     trigger: u8,
     /// BUSY's pin: EXTI line, and port (A is 0).
     busy: (usize, u8),
@@ -114,8 +118,8 @@ impl Ring {
             let i = i as u32;
             [count.0, first + i * size_of::<Block>() as u32, link((i + 1) % BLOCKS)]
         });
-        // SAFETY: `stop` has just reset the channel, so that the DMA does not read the list, and nobody else
-        // ever does.
+        // SAFETY: `stop` has just reset the channel, so that the DMA does not read the list, and
+        // nobody else ever does.
         unsafe { ITEMS[self.channel].0.get().write_volatile(list) };
         fence(Ordering::SeqCst);
 
@@ -151,7 +155,8 @@ impl Ring {
         port.cfg1().write(|w| {
             w.set_dsize(15);
             w.set_fthlv(Fthlv::ONE_FRAME);
-            // 160 MHz / 4: 40 MHz; AD7606B Rev. 0, "Timing Specifications", allows it from 2.7 V of VDRIVE on
+            // 160 MHz / 4: 40 MHz; AD7606B Rev. 0, "Timing Specifications", allows it from 2.7 V of
+            // VDRIVE on
             w.set_mbr(Mbr::DIV4);
             w.set_rxdmaen(true);
         });
@@ -159,8 +164,9 @@ impl Ring {
             w.set_comm(Comm::RECEIVER);
             w.set_master(Master::MASTER);
             w.set_cpol(Cpol::IDLE_HIGH);
-            // The converter puts a bit out on a rising edge, and the next falling one comes before it is valid: it is taken with the
-            // rising edge after that, which puts the next one out (timing in firmware/tests/front_end/timing.rs).
+            // The converter puts a bit out on a rising edge, and the next falling one comes before
+            // it is valid: it is taken with the rising edge after that, which puts the next one out
+            // (timing in firmware/tests/front_end/timing.rs).
             w.set_cpha(Cpha::SECOND_EDGE);
             // the pins stay driven while the port is off (RM0456, SPI_CFG2, AFCNTR)
             w.set_afcntr(true);
@@ -192,27 +198,30 @@ impl Ring {
         port.cr1().modify(|w| w.set_spe(true));
     }
 
-    /// Block `number`, counted from the start, as it is by now. The DMA may write there meanwhile: only the ring's position, read off
-    /// afterwards, tells that it did not.
+    /// Block `number`, counted from the start, as it is by now. The DMA may write there meanwhile:
+    /// only the ring's position, read off afterwards, tells that it did not.
     ///
-    /// Every word is read as a register would be. A reference would promise that nobody writes while it lives, which nobody can for the DMA,
-    /// and its reads might be moved behind the position's.
+    /// Every word is read as a register would be. A reference would promise that nobody writes
+    /// while it lives, which nobody can for the DMA, and its reads might be moved behind the
+    /// position's.
     pub fn block(&self, number: u32) -> Block {
         const HALF_WORDS: usize = size_of::<Block>() / 2;
         let ring = core::ptr::from_ref(&MEMORY[self.channel]).cast::<u16>();
         let mut block: Block = [[0; CHIP_BYTES]; BLOCK_SCANS];
         for (place, bytes) in block.as_flattened_mut().chunks_exact_mut(2).enumerate() {
             let place = (number % BLOCKS) as usize * HALF_WORDS + place;
-            // SAFETY: in bounds by the remainder, and aligned as the ring is; half-words are what the DMA writes, each at once.
+            // SAFETY: in bounds by the remainder, and aligned as the ring is; half-words are what
+            // the DMA writes, each at once.
             bytes.copy_from_slice(&unsafe { ring.add(place).read_volatile() }.to_ne_bytes());
         }
         block
     }
 
-    /// How far the ring is filled, words from its beginning: the address that the DMA writes next (RM0456, "GPDMA channel x
-    /// destination address register").
+    /// How far the ring is filled, words from its beginning: the address that the DMA writes next
+    /// (RM0456, "GPDMA channel x destination address register").
     pub fn position(&self) -> u32 {
-        // what was read before is memory, and this is a device: the processor keeps no order between the two by itself
+        // what was read before is memory, and this is a device: the processor keeps no order
+        // between the two by itself
         fence(Ordering::SeqCst);
         let filled = GPDMA1.ch(self.channel).dar().read().wrapping_sub(MEMORY[self.channel].0.get() as u32);
         // behind the last block, until the list's first is loaded, it is the ring's end
@@ -302,7 +311,8 @@ pub fn enable_interrupts() {
         &[interrupt::GPDMA1_CHANNEL0, interrupt::GPDMA1_CHANNEL1]
     };
     for number in numbers {
-        // SAFETY: their handlers stand above and touch nothing but atomics and their own peripherals.
+        // SAFETY: their handlers stand above and touch nothing but atomics and their own
+        // peripherals.
         unsafe { number.enable() };
     }
 }

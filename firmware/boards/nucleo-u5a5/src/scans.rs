@@ -1,8 +1,9 @@
 //! The board's scans: CONVST from TIM2, counted by TIM5; sixteen channels out of two rings.
 //!
-//! Whatever goes wrong, the count of CONVST goes on, so that the next block says exactly how many scans are missing
-//! before it. The remedy depends on what went wrong: rings that lost step are emptied and joined anew; converters
-//! that fell silent are reset, set up and tested again, over and over, with a report each time the trouble changes.
+//! Whatever goes wrong, the count of CONVST goes on, so that the next block says exactly how many
+//! scans are missing before it. The remedy depends on what went wrong: rings that lost step are
+//! emptied and joined anew; converters that fell silent are reset, set up and tested again, over
+//! and over, with a report each time the trouble changes.
 
 use core::mem::forget;
 
@@ -37,7 +38,8 @@ use core::sync::atomic::Ordering;
 pub const TIMER_HZ: u32 = 160_000_000;
 /// CONVST is low for the first µs of each period and rises then: counts of TIM2.
 pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
-/// TIM5 hears of TIM2's update through a synchroniser of some cycles (RM0456, "Timer synchronization"): counts after which it has.
+/// TIM5 hears of TIM2's update through a synchroniser of some cycles (RM0456, "Timer
+/// synchronization"): counts after which it has.
 pub const SETTLED: u32 = 32;
 /// A block takes 0.29 ms; this long without one is silence.
 const PATIENCE: Duration = Duration::from_millis(5);
@@ -152,7 +154,8 @@ impl Converters {
         FIRST.start(self.chips.first.request());
         SECOND.start(self.chips.second.request());
         self.reader.start(critical_section::with(|_| {
-            // wait for the end of a period (20 µs at most): there is a µs between its end and CONVST's edge
+            // wait for the end of a period (20 µs at most): there is a µs between its end and
+            // CONVST's edge
             let before = TIM5.cnt().read();
             while TIM5.cnt().read() == before {}
             self.convst.enable_channel(Channel::Ch1, true);
@@ -202,13 +205,15 @@ fn alignment() -> Alignment {
         settled: SETTLED,
         // no averaging ends within half of its longest time
         read_from: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 500),
-        // the longest averaging, 144 bits of 25 ns, two idle clocks before and after, and 1 µs for trigger and DMA
+        // the longest averaging, 144 bits of 25 ns, two idle clocks before and after, and 1 µs for
+        // trigger and DMA
         read_by: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 1_000 + 148 * 25 + 1_000),
     };
     Alignment { clock, block_scans: BLOCK_SCANS as u32, blocks: BLOCKS }
 }
 
-/// Clock and rings as they are now. Twice the same count of periods around the rest says that all of it is of one period.
+/// Clock and rings as they are now. Twice the same count of periods around the rest says that all
+/// of it is of one period.
 fn look() -> Moment {
     loop {
         let periods = TIM5.cnt().read();

@@ -1,7 +1,8 @@
-//! What is measured ten times a second by the chip's own converter, ADC1: the bias of the two constant-current supplies, the specimen's
-//! temperature, and whether the USB's 5 V are there.
+//! What is measured ten times a second by the chip's own converter, ADC1: the bias of the two
+//! constant-current supplies, the specimen's temperature, and whether the USB's 5 V are there.
 //!
-//! Circuits and pins: docs/WIRING.md. A conversion takes a few µs; nothing waits for it but this task, which runs in thread mode.
+//! Circuits and pins: docs/WIRING.md. A conversion takes a few µs; nothing waits for it but this
+//! task, which runs in thread mode.
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -22,15 +23,16 @@ const STEPS: f32 = 16_384.0;
 const REFERENCE_V: f32 = 3.3;
 /// From a supply's socket to the pin: 100 kΩ and 10 kΩ.
 const BIAS_DIVIDER: f32 = 11.0;
-/// From the USB's 5 V to the pin, as a factor: 330 kΩ and 49.9 kΩ on the Nucleo (not checked against its schematic: measure it once).
+/// From the USB's 5 V to the pin, as a factor: 330 kΩ and 49.9 kΩ on the Nucleo (not checked
+/// against its schematic: measure it once).
 const VBUS_DIVIDER: f32 = 7.61;
-/// Above this the bus has power, V: behind a hub without power of its own a device still gets 4.35 V (USB 2.0, 7.2.2), less for moments, and at
-/// little more than half of that there is no port.
+/// Above this the bus has power, V: behind a hub without power of its own a device still gets 4.35
+/// V (USB 2.0, 7.2.2), less for moments, and at little more than half of that there is no port.
 const VBUS_VALID_V: f32 = 2.5;
 const EVERY_MS: u64 = 100;
 
-/// The pins: analog after a reset, and nobody else's. PC0 is ADC1_IN1 and so on (the STM32U5A5's datasheet, "Pin description"; the same
-/// numbers in embassy-stm32's tables).
+/// The pins: analog after a reset, and nobody else's. PC0 is ADC1_IN1 and so on (the STM32U5A5's
+/// datasheet, "Pin description"; the same numbers in embassy-stm32's tables).
 pub type Pins = (Peri<'static, PC0>, Peri<'static, PC1>, Peri<'static, PC2>, Peri<'static, PC3>);
 /// PC0.
 const THERMOMETER: u8 = 1;

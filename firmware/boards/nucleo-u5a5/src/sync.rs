@@ -1,11 +1,13 @@
 //! Sync input, sync output and clock input, by TIM3.
 //!
-//! TIM3 counts the board's 160 MHz and never stops. Its channel 1 catches the count at each edge of the external clock and says so to TIM2,
-//! whose period begins anew with it; channel 3 catches it at the edges of the sync input. No interrupt and no DMA belongs to it: acquisition
-//! looks once a block, so that no signal at these pins, however fast, takes time from anything.
+//! TIM3 counts the board's 160 MHz and never stops. Its channel 1 catches the count at each edge of
+//! the external clock and says so to TIM2, whose period begins anew with it; channel 3 catches it
+//! at the edges of the sync input. No interrupt and no DMA belongs to it: acquisition looks once a
+//! block, so that no signal at these pins, however fast, takes time from anything.
 //!
-//! With the external clock TIM2's own period is longer by [`FLYWHEEL`]: an edge that does not come lets it go on by itself, late, and no
-//! converter, drive or coil ever waits for a pin. That it is late shows in the counts of a block's scans.
+//! With the external clock TIM2's own period is longer by [`FLYWHEEL`]: an edge that does not come
+//! lets it go on by itself, late, and no converter, drive or coil ever waits for a pin. That it is
+//! late shows in the counts of a block's scans.
 
 use core::mem::forget;
 
@@ -27,7 +29,8 @@ pub const PERIOD: u32 = TIMER_HZ / SCAN_RATE_HZ;
 /// By how many counts a scan is longer whose edge of the external clock does not come: a hundredth.
 const FLYWHEEL: u32 = PERIOD / 100;
 const RULER: Ruler = Ruler { period: PERIOD, taken_at: CONVST_LOW };
-/// TIM3_CH1 at PC6, TIM3_CH3 at PC8 (the datasheet's "Alternate functions"; the same number in embassy-stm32's tables).
+/// TIM3_CH1 at PC6, TIM3_CH3 at PC8 (the datasheet's "Alternate functions"; the same number in
+/// embassy-stm32's tables).
 const TIM3_FUNCTION: u8 = 2;
 /// Places of the two channels in TIM3's registers.
 const CLOCK: usize = 0;
@@ -62,11 +65,13 @@ impl Port {
             TIM3.ccmr_input(channel / 2).modify(|w| w.set_ccs(channel % 2, CcmrInputCcs::TI4));
             TIM3.ccer().modify(|w| w.set_cce(channel, true));
         }
-        // each catch of channel 1 is a trigger (RM0456, "TIMx control register 2", MMS: compare pulse)
+        // each catch of channel 1 is a trigger (RM0456, "TIMx control register 2", MMS: compare
+        // pulse)
         TIM3.cr2().modify(|w| w.set_mms(Mms::COMPARE_PULSE));
         timer.start();
         forget(timer);
-        // a new period's length counts from the next period on: TIM2 must never find itself beyond its end
+        // a new period's length counts from the next period on: TIM2 must never find itself beyond
+        // its end
         TIM2.cr1().modify(|w| w.set_arpe(true));
         Self {
             output: Output::new(output, Level::Low, Speed::Medium),
@@ -139,7 +144,8 @@ impl Port {
     }
 }
 
-/// Count of periods, TIM2's and TIM3's counts at one moment; the last two are read some ten cycles after one another, 0.003 of a scan.
+/// Count of periods, TIM2's and TIM3's counts at one moment; the last two are read some ten cycles
+/// after one another, 0.003 of a scan.
 fn look() -> (u32, u32, u32) {
     loop {
         let now = TIM5.cnt().read();
@@ -150,7 +156,8 @@ fn look() -> (u32, u32, u32) {
     }
 }
 
-/// Counts between two edges of the external clock, measured for four scans at most with interrupts off: nothing runs by these scans yet.
+/// Counts between two edges of the external clock, measured for four scans at most with interrupts
+/// off: nothing runs by these scans yet.
 fn period() -> Option<u32> {
     critical_section::with(|_| {
         // what was caught before

@@ -1,4 +1,5 @@
-//! USB: device, receive and transmit in one task, built anew when the bus comes up at the other speed.
+//! USB: device, receive and transmit in one task, built anew when the bus comes up at the other
+//! speed.
 
 use embassy_futures::select::{select, select3, select4};
 use embassy_stm32::peripherals::{PA11, PA12, USB_OTG_HS};
@@ -20,8 +21,8 @@ pub type Sink = usb::Sink<'static, Mended<Driver<'static, USB_OTG_HS>, Otg>>;
 
 /// Packets that wait for their readers: two bulk endpoints, the control endpoint.
 const RECEIVED_BYTES: usize = 2 * 512 + 64 + 64;
-/// Between two signs of life. 400 frames of high speed and 50 of full speed: no multiple of the 16 384 after which their number
-/// comes round.
+/// Between two signs of life. 400 frames of high speed and 50 of full speed: no multiple of the 16
+/// 384 after which their number comes round.
 const BEAT: Duration = Duration::from_millis(50);
 /// Between two looks at the speed.
 const LOOK: Duration = Duration::from_millis(10);
@@ -32,7 +33,8 @@ bind_interrupts!(struct Irqs {
     OTG_HS => InterruptHandler<USB_OTG_HS>;
 });
 
-/// The core's registers (RM0456, "OTG_HS device registers"; the bits are also those of the driver's own register table).
+/// The core's registers (RM0456, "OTG_HS device registers"; the bits are also those of the driver's
+/// own register table).
 pub struct Otg;
 
 impl Registers for Otg {
@@ -90,7 +92,8 @@ pub async fn task(
         // whatever was on its way is lost, and nobody can take back what was ordered
         core.link_is_cut();
         if !slow::has_vbus() {
-            // a device without power from the bus holds none of its lines up (USB 2.0, 7.1.5 and 7.2.1)
+            // a device without power from the bus holds none of its lines up (USB 2.0, 7.1.5 and
+            // 7.2.1)
             pac::USB_OTG_HS.dctl().modify(|w| w.set_sdis(true));
             select(beat(), vbus(true)).await;
         }
@@ -108,8 +111,8 @@ fn enumerated() -> Option<Speed> {
     Some(if high { Speed::High } else { Speed::Full })
 }
 
-/// Waits until the bus has power, or has none. The driver's own detection wants VBUS at PA9, which on the Nucleo is the ST-LINK's serial
-/// port; the board brings it to PC2 instead (docs/WIRING.md).
+/// Waits until the bus has power, or has none. The driver's own detection wants VBUS at PA9, which
+/// on the Nucleo is the ST-LINK's serial port; the board brings it to PC2 instead (docs/WIRING.md).
 async fn vbus(there: bool) {
     while slow::has_vbus() != there {
         Timer::after(LOOK).await;
@@ -123,8 +126,9 @@ async fn other_than(speed: Speed) {
     }
 }
 
-/// Beats while the bus makes progress, or has no host to make any with: on a bus that runs the number of the frame moves every
-/// millisecond (USB 2.0, 5.3.3), whatever the host reads. A core that is configured and stands still is one that hangs.
+/// Beats while the bus makes progress, or has no host to make any with: on a bus that runs the
+/// number of the frame moves every millisecond (USB 2.0, 5.3.3), whatever the host reads. A core
+/// that is configured and stands still is one that hangs.
 async fn beat() -> ! {
     let mut before = None;
     loop {

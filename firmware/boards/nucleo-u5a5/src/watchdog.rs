@@ -1,9 +1,10 @@
 //! The independent watchdog: fed only while acquisition and link are alive.
 //!
-//! Each of the two beats from where it does its work: acquisition with every block (or every failed try to get
-//! one), the link from the executor that runs USB while the bus moves or has no host. A host that is not there, or converters that are broken,
-//! are not reasons for a reset; a task that hangs is. The watchdog runs from its own oscillator, and nothing
-//! stops it but a reset, which drops the coil.
+//! Each of the two beats from where it does its work: acquisition with every block (or every failed
+//! try to get one), the link from the executor that runs USB while the bus moves or has no host. A
+//! host that is not there, or converters that are broken, are not reasons for a reset; a task that
+//! hangs is. The watchdog runs from its own oscillator, and nothing stops it but a reset, which
+//! drops the coil.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

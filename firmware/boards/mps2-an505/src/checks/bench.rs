@@ -1,8 +1,9 @@
 //! The benchmark: instructions of the real tasks, served from inside the image by a script.
 //!
-//! The same tasks over the same parts run as under the simulator; only [`serve`] stands in for it. What the
-//! script itself does between two turns is not counted. Sixteen channels of small noise around zero flow,
-//! whose high bytes are mostly 0 or 255: a hard case for COBS, and the usual one at rest.
+//! The same tasks over the same parts run as under the simulator; only [`serve`] stands in for it.
+//! What the script itself does between two turns is not counted. Sixteen channels of small noise
+//! around zero flow, whose high bytes are mostly 0 or 255: a hard case for COBS, and the usual one
+//! at rest.
 
 use core::cell::RefCell;
 use core::hint::black_box;

@@ -1,7 +1,7 @@
 //! Counting instructions with a timer of the machine.
 //!
-//! Under `-icount shift=10` QEMU lets 1024 ns pass per executed instruction and nothing else moves its
-//! clock, so TIMER0 (20 MHz) counts instructions, the same in every run. They are not cycles.
+//! Under `-icount shift=10` QEMU lets 1024 ns pass per executed instruction and nothing else moves
+//! its clock, so TIMER0 (20 MHz) counts instructions, the same in every run. They are not cycles.
 
 use core::ptr;
 

@@ -1,4 +1,5 @@
-//! The stack's high-water mark: the start-up code paints the stack, and what lost its paint was used.
+//! The stack's high-water mark: the start-up code paints the stack, and what lost its paint was
+//! used.
 
 use core::ptr;
 
@@ -14,8 +15,9 @@ unsafe extern "C" {
 /// Bytes of stack that were ever used.
 pub fn high_water() -> usize {
     let (mut word, top) = (&raw const _stack_end, &raw const _stack_start);
-    // SAFETY: between the two lies the stack's memory and nothing else; it is read word by word, volatile,
-    // and never beyond its top. What is in use is above this function's own frame, where the scan ends.
+    // SAFETY: between the two lies the stack's memory and nothing else; it is read word by word,
+    // volatile, and never beyond its top. What is in use is above this function's own frame, where
+    // the scan ends.
     unsafe {
         while word < top && ptr::read_volatile(word) == STACK_PAINT_VALUE {
             word = word.add(1);
