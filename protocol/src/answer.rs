@@ -268,7 +268,8 @@ pub enum Shaker {
     Stopping,
 }
 
-/// Counters since the device started. They never decrease within a boot.
+/// Counters of frames, events and logs since the device started, and of scans since the stream
+/// started. They never decrease, except that the latter restart with each stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Counters {
     /// Good frames received.
