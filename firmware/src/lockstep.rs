@@ -11,7 +11,7 @@
 //! | [`MAGIC_AT`] | 4 | simulator, once | [`MAGIC`]: this memory is served |
 //! | [`ASK_AT`] | 64 | board | [`Ask`] |
 //! | [`REPLY_AT`] | 64 | simulator | [`Reply`] |
-//! | [`TEXT_AT`] | 4096 | the side whose turn it is | [`Setup`], stage request, refusal or panic message |
+//! | [`TEXT_AT`] | 4096 | both, in turn | [`Setup`], stage request, refusal or panic message |
 //! | [`BLOCK_AT`] | 896 | simulator | a [`Delivery`], then the words of both converters |
 //! | [`SEEN_AT`] | 28 | simulator | events at the sync port, if the [`Delivery`] announces them |
 //! | [`DRIVE_AT`] | 480 | board | codes for the shaker's drive |

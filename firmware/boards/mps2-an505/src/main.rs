@@ -10,7 +10,7 @@ use semihosting::{eprintln, process};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     jointrig_board_fault::limit_stack();
-    // a command line that cannot be read is treated as none
+    // an unreadable command line is treated as empty
     let words = args::<256>().ok();
     let mut words = words.as_ref().into_iter().flatten();
     if words.next() != Some(Ok("serve")) {
