@@ -250,7 +250,7 @@ pub enum Hammer {
     Firing,
     /// Pulse and rebounds are being recorded.
     Listening,
-    /// Hold-off time before the next arming.
+    /// Hold-off time after a shot; the next shot waits for its end.
     HoldOff,
 }
 

@@ -100,13 +100,14 @@ pub enum Reason {
         /// Index in the scan, from 0.
         channel: u8,
     },
-    /// The controlled quantity exceeds its requested amplitude by half.
+    /// The controlled quantity stays more than a quarter above its requested amplitude, although
+    /// the drive is reduced.
     Runaway,
     /// The largest drive that the request allows does not reach the requested amplitude.
     Weak,
     /// Drive samples were supplied too late; the drive is at rest.
     RanDry,
-    /// The front end lost scans or delivered none for [`crate::limits::SCAN_SILENCE_MS`]; nothing
+    /// The front end lost scans, or delivered none for [`crate::limits::SCAN_SILENCE_MS`]; nothing
     /// may move without measured data.
     FrontEnd,
     /// A required sensor is missing: the supply of its channel detects an open cable or a short

@@ -63,8 +63,8 @@ pub const SHAKE_SCANS_PER_CYCLE: u32 = 10;
 /// vibrometer's decoder or an amplifier's range switch lie within it; confusing V with mV does not.
 pub const SCALE_FACTOR_CAP: u32 = 100;
 
-/// A host from which nothing was received for this long is considered gone: the hammer disarms (ms
-/// of the device's time).
+/// A host from which nothing was received for this long is considered gone: the hammer disarms and
+/// the shaker comes to rest (ms of the device's time).
 pub const LINK_SILENCE_MS: u32 = 1_000;
 
 /// Scans that fit one block of `channels` 16-bit channels; `None` when there are no channels or too

@@ -141,7 +141,8 @@ pub struct Fire {
     /// Length of the windows in which residual motion is evaluated, in decimated samples (0: not
     /// evaluated).
     pub quiet_window: u16,
-    /// Cancel the shot when the structure is not quiet within this many scans from `not_before`.
+    /// The shot is abandoned when the structure is not quiet within this many scans from
+    /// `not_before`.
     pub quiet_patience: u32,
 }
 

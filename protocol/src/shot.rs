@@ -15,7 +15,8 @@ pub enum Phase {
     Listening,
     /// Complete.
     Done,
-    /// The bolt did not reach the structure within the listening time.
+    /// The bolt did not reach the structure within the flight time
+    /// ([`crate::request::Trigger::flight_scans`]).
     Missed,
     /// The structure did not become quiet within the time given; the coil was not energised.
     NotQuiet,

@@ -43,7 +43,7 @@ global_asm!(
     "bhs 1b",
     "pop {{r4-r10}}",
     "b 4f",
-    // only the destination is unaligned: load eight words at once and store them singly
+    // only the destination is unaligned: load eight words in one instruction and store them singly
     "2: lsls r3, r1, #30",
     "bne 9f",
     "push {{r4-r10}}",
