@@ -2,11 +2,12 @@
 //! lock-in matches the requested one.
 //!
 //! The plant is a structure: its amplitude follows the drive's proportionally, after a delay of
-//! some tens of ms (with 1 % damping at 208 Hz, it settles with 77 ms). The drive is therefore
-//! corrected by ratios: after each measurement by a fraction of the missing logarithmic ratio, and
-//! by a factor of at most 1.2. With measurements of 80 ms or more, 0.35 of a change is left for the
-//! next measurement, and a correction of 0.3 of the error then converges without oscillation: the
-//! roots of (z − 1)(z − 0.35) + 0.3 · 0.65 have the magnitude 0.74 and angles below 23°.
+//! some tens of ms (with 1 % damping at 208 Hz, it settles with a time constant of 77 ms). The
+//! drive is therefore corrected by ratios: after each measurement by a fraction of the missing
+//! logarithmic ratio, and by a factor of at most 1.2. With measurements of 80 ms or more, 0.35 of a
+//! change is left for the next measurement, and a correction of 0.3 of the error then converges
+//! without oscillation: the roots of (z − 1)(z − 0.35) + 0.3 · 0.65 have the magnitude 0.74 and
+//! angles below 23°.
 //!
 //! **A contact that slips** behaves differently. Up to its friction limit it is stiff; with one per
 //! cent more drive it moves several times as far, and the logarithm of the amplitude changes up to
