@@ -1,8 +1,9 @@
-//! Acquisition: blocks of scans from the converters, through the hammer's machine, into the ring.
+//! Acquisition: takes blocks of scans from the converters, passes them through the hammer's state
+//! machine, and puts them into the ring.
 //!
-//! One block is 15 scans of 16 channels, 293 µs at 51.2 kHz: that is the time this task has for each. What
-//! it does with a block is bounded and done under one lock; the orders for coil and drive that come of it
-//! are carried out right after.
+//! One block is 15 scans of 16 channels, 293 µs at 51.2 kHz: this is the time budget per block. The
+//! work per block is bounded and done under one lock; the resulting orders for coil and drive are
+//! carried out immediately afterwards.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::Instant;
@@ -17,11 +18,12 @@ use crate::hammer::{CoilOrder, Scanned};
 use crate::ring::Range;
 use crate::state::State;
 
-/// Blocks for which the link is woken: a wake-up costs a tenth of what a block does, and nothing is in such haste. What is left over
-/// goes with the next look of [`crate::watch`], a tenth of a second later.
+/// Unsent blocks at which the transmit task is woken: waking it costs a tenth of the processing of
+/// a block, and no block is that urgent. A smaller remainder is sent after the next period of
+/// [`crate::watch`], at most 0.1 s later.
 const BLOCKS_PER_WAKE: u64 = 4;
 
-/// Runs for ever.
+/// Runs forever.
 pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
     core: &Core<'_, M>,
     scans: &mut S,
@@ -31,11 +33,11 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
 ) -> ! {
     let mut samples = Aligned([0; BLOCK_SAMPLE_BYTES]);
     let mut codes = [0; BLOCK_SAMPLE_BYTES / 2];
-    // a host may ask before there is a stream
+    // a host may ask for the inputs before a stream runs
     core.watch_inputs(inputs);
     loop {
         if scans.can_be_held() {
-            // a clock is asked for while nothing runs
+            // a clock can be requested while no stream runs
             while !core.wait_until_it_may_run().await {
                 core.keep_in_step(scans);
             }
@@ -56,7 +58,7 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
                 state.tell_of_shaker(stops);
             });
         } else if given.last {
-            // a drive that has just taken codes takes their end
+            // ignored: a drive that has just accepted codes also accepts their end
             let _ = drive.play(&[]);
         }
         if let Some(seen) = scans.seen() {
@@ -71,29 +73,29 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
     }
 }
 
-/// What a block has yielded.
+/// Results of a block.
 #[derive(Clone, Copy, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own, true or not")]
 struct Given {
     /// Codes for the drive.
     codes: usize,
-    /// The shaker is at rest after these.
+    /// The shaker is at rest after these codes.
     last: bool,
-    /// An order for the coil, from here or from elsewhere.
+    /// An order for the coil, from this block or from another task.
     coil: Option<CoilOrder>,
-    /// The drive must rest at once.
+    /// The drive must go to rest immediately.
     drive_off: bool,
-    /// The link is to be woken.
+    /// The transmit task must be woken.
     send: bool,
-    /// The board has something to do for clock or sync output.
+    /// The board must apply a clock change or raise the sync output.
     sync: bool,
 }
 
-/// Words are copied faster than bytes.
+/// Aligned, because words are copied faster than bytes.
 #[repr(align(4))]
 struct Aligned([u8; BLOCK_SAMPLE_BYTES]);
 
-/// The block in hand, for the hammer's machine.
+/// The current block, as the hammer's state machine reads it.
 struct InHand<'a> {
     first_scan: u64,
     channels: usize,
@@ -115,8 +117,9 @@ impl Scanned for InHand<'_> {
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// A front end that can be held waits here: without a stream, and half a ring ahead of the host. False when the board has
-    /// something to do for clock or sync output first.
+    /// Waits while a front end that can be held must not run: without a stream, or when it is half
+    /// a ring ahead of the host's acknowledgement. Returns false when the board must first apply a
+    /// clock change or raise the sync output.
     async fn wait_until_it_may_run(&self) -> bool {
         loop {
             let (runs, due) = self.with(|state| {
@@ -130,14 +133,15 @@ impl<M: RawMutex> Core<'_, M> {
             if runs {
                 return true;
             }
-            // whatever is left of what was delivered
+            // send what remains of the delivered blocks
             self.to_send.signal(());
             self.may_run.wait().await;
         }
     }
 
-    /// Interlock and emergency stop, once a block. The hardware acts on both by itself; this is how the
-    /// machine learns of it. A board whose inputs interrupt tells sooner ([`Core::see_inputs`]).
+    /// Reads interlock and emergency stop, once per block. The hardware acts on both independently;
+    /// this call informs the state machine. A board whose inputs trigger interrupts reports changes
+    /// sooner ([`Core::see_inputs`]).
     fn watch_inputs(&self, inputs: &mut impl Inputs) {
         let closed = inputs.interlock_closed();
         let pressed = inputs.emergency_stop();
@@ -157,7 +161,7 @@ impl<M: RawMutex> Core<'_, M> {
         });
     }
 
-    /// Takes one delivered block, and writes the codes for the drive.
+    /// Processes one delivered block and writes the codes for the drive.
     fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES], codes: &mut [i16]) -> Given {
         let channels = self.facts.channels.len();
         let (pairs, _) = samples.as_chunks::<2>();
@@ -179,7 +183,8 @@ impl<M: RawMutex> Core<'_, M> {
 }
 
 impl State<'_> {
-    /// Takes a block that was delivered after so many were missed; `pairs` are its codes, whole scans.
+    /// Processes a block that follows `delivered.missed` missed scans; `pairs` are its codes, in
+    /// whole scans.
     fn take(
         &mut self,
         delivered: Delivered,
@@ -198,7 +203,7 @@ impl State<'_> {
         if scans == 0 {
             return Given::default();
         }
-        // at rest there is no outcome, not even one of 80 bytes that says so
+        // a disarmed hammer yields no outcome, which saves handling an empty one of 80 bytes
         let outcome = (!self.hammer.is_disarmed()).then(|| self.hammer.block(&block, self.friction.as_ref()));
         let trigger = outcome.as_ref().is_some_and(|outcome| outcome.trigger);
         let flags = if over { OVER_RANGE } else { 0 } | if trigger { TRIGGER } else { 0 };
@@ -207,7 +212,7 @@ impl State<'_> {
             self.counters.scans_dropped += dropped;
             self.counters.scans_produced += scans as u64;
         } else if let Some(friction) = &self.friction {
-            // of a stream, the ring has the last block
+            // while streaming, the ring holds the last block and the mean is computed on request
             self.friction_n = friction.mean_of(pairs, channels);
         }
         let moves = self.shaker.moves();
@@ -223,10 +228,10 @@ impl State<'_> {
         Given { codes: if moves { scans } else { 0 }, last, ..Given::default() }
     }
 
-    /// Scans that the front end did not deliver: the clock went on.
+    /// Accounts for scans that the front end did not deliver; the scan index advances over them.
     #[inline(never)]
     fn miss(&mut self, missed: u32) {
-        // whatever was to move was to move by what these scans would have shown
+        // nothing may move without the data of these scans
         self.bring_to_rest(Reason::FrontEnd);
         self.counters.scans_missed += u64::from(missed);
         if self.streaming {

@@ -1,8 +1,10 @@
-//! What a board must bring: scans, a coil, a drive, two inputs, bytes in, bytes out, and perhaps a stage.
+//! The interface that a board must implement: scans, a coil, a drive, two inputs, bytes in, bytes
+//! out, and optionally a stage.
 //!
-//! The contract is small on purpose. Everything that can be decided above it is decided above it, where
-//! a PC can test it; what stands here is what only hardware can do. A board groups its parts under
-//! [`Board`] so that one name says them all, and hands each part to the task that uses it.
+//! The interface is small on purpose. Every decision that does not need hardware is made above it,
+//! where it can be tested on a PC; the traits here cover what only hardware can do. A board groups
+//! its parts under [`Board`], so that one name refers to all of them, and passes each part to the
+//! task that uses it.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::answer::Refusal;
@@ -15,8 +17,8 @@ use crate::ruler::{Ago, Span};
 
 /// The parts of one board.
 pub trait Board {
-    /// Guards what the tasks share: a critical section on a controller whose tasks run at several
-    /// priorities, nothing in the simulator.
+    /// Protects the data shared by the tasks: a critical section on a controller whose tasks run at
+    /// several priorities, no protection in the simulator.
     type Mutex: RawMutex;
     /// The converters.
     type Scans: Scans;
@@ -30,7 +32,7 @@ pub trait Board {
     type Source: ByteSource;
     /// Bytes to the host.
     type Sink: ByteSink;
-    /// Who moves hammer and laser.
+    /// Positions hammer and laser.
     type Stage: Stage;
 }
 
@@ -38,42 +40,47 @@ pub trait Board {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Delivered {
-    /// Scans in the block, at most what fits it.
+    /// Scans in the block; at most as many as fit one block.
     pub scans: u8,
     /// Scans that were lost between the last block and this one.
     pub missed: u32,
-    /// Whether any code may be beyond half of the converters' range; if not, none is looked at for its end.
+    /// Whether any code may be beyond half of the converters' range; if not, the check for the ends
+    /// of the range is skipped.
     pub loud: bool,
 }
 
-/// The converters, sampling all channels on one edge of a hardware timer.
+/// The converters, which sample all channels on one edge of a hardware timer.
 pub trait Scans {
-    /// Whether the clock of the scans can be held (a simulated front end). It then never runs more than
-    /// half a ring ahead of the host's acknowledgement, so that nothing depends on the host's speed.
+    /// Whether the scan clock can be held (a simulated front end). It then never runs more than
+    /// half a ring ahead of the host's acknowledgement, so that nothing depends on the host's
+    /// speed.
     fn can_be_held(&self) -> bool {
         false
     }
 
-    /// Waits for the next block and writes it: scan by scan, channel by channel, little-endian 16 bit.
+    /// Waits for the next block and writes it: scan by scan, channel by channel, little-endian 16
+    /// bit.
     ///
-    /// The sampling instants are the timer's; being late here costs buffer space, never punctuality.
+    /// The sampling instants are set by the timer; a late call uses buffer space but does not
+    /// change the timing.
     fn next(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> impl Future<Output = Delivered>;
 
-    /// Counts of the board's own crystal in a nominal scan, of which [`Seen::span`] speaks.
+    /// Counts of the board's own crystal per nominal scan, the unit of [`Seen::span`].
     const PERIOD: u32 = 1;
 
-    /// What sync input and external clock have done since this was asked last; asked after each block. Asking also ends a pulse of
-    /// the sync output.
+    /// Activity of sync input and external clock since the last call; called after each block. The
+    /// call also ends a pulse of the sync output.
     #[inline]
     fn seen(&mut self) -> Option<Seen> {
         None
     }
 
-    /// Lets this time the scans from now on. The count of scans goes on, and so do the scans when the clock fails: by the board's own
-    /// crystal, a little slower, so that the failure shows in [`Seen::span`].
+    /// Selects the clock that times the scans from now on. The count of scans continues. If the
+    /// external clock fails, scans continue with the board's own crystal, slightly slower, so that
+    /// the failure is visible in [`Seen::span`].
     ///
     /// # Errors
-    /// Nothing that could be a clock comes to the input; the board's own goes on.
+    /// No usable clock signal at the input; the board's own clock continues.
     fn clock(&mut self, clock: Clock) -> Result<(), ClockFault> {
         match clock {
             Clock::Internal => Ok(()),
@@ -81,56 +88,58 @@ pub trait Scans {
         }
     }
 
-    /// Raises the sync output, until [`Scans::seen`] is asked next; when that was. None on a board without one.
+    /// Raises the sync output until the next call of [`Scans::seen`], and returns the instant.
+    /// `None` on a board without a sync output.
     fn mark(&mut self) -> Option<Ago> {
         None
     }
 }
 
-/// What sync input and external clock have done.
+/// Activity of sync input and external clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
     /// The newest edge at the sync input.
     pub edge: Option<Ago>,
-    /// Edges that came too fast after another for their instants to be known: at least so many.
+    /// Edges that followed another too fast for their instants to be known; a lower bound.
     pub lost: u32,
-    /// How long scans took that an external clock timed.
+    /// Duration of some scans timed by an external clock.
     pub span: Option<Span>,
 }
 
 /// The coil that pulls the hammer's bolt.
 pub trait Coil {
-    /// Longest pulse, µs: the hardware ends any pulse by then, whatever the software does.
+    /// Longest pulse, µs: the hardware ends any pulse by then, independently of the software.
     fn cap_us(&self) -> u32;
 
-    /// Energises the coil once, from the next scan on, for `width_us` (already checked against the cap).
-    /// The end of the pulse must be the hardware's doing.
+    /// Energises the coil once, from the next scan on, for `width_us` (already checked against the
+    /// cap). The hardware must end the pulse.
     fn pulse(&mut self, width_us: u32);
 
-    /// De-energises the coil at once.
+    /// De-energises the coil immediately.
     fn off(&mut self);
 }
 
-/// The shaker's drive: a converter that plays one code per scan, from the scans' own timer.
+/// The shaker's drive: a converter that outputs one code per scan, timed by the scan timer.
 pub trait Drive {
-    /// Output at the largest code, V; 0 when the board drives no shaker.
+    /// Output voltage at the largest code, V; 0 when the board has no shaker drive.
     fn full_scale_v(&self) -> f32;
 
-    /// Takes the codes of as many scans as the block that was just delivered had. They are played without
-    /// a gap after those given before; what follows the last code given is rest (0 V).
+    /// Takes as many codes as the block that was just delivered has scans. They are output without
+    /// a gap after the previous codes; after the last code the output is at rest (0 V).
     ///
-    /// No codes at all say that a motion ends here: what was given is still played, and the next codes
-    /// begin another one, whenever they come.
+    /// An empty slice marks the end of a motion: codes given before are still output, and the next
+    /// codes begin a new motion, whenever they come.
     ///
     /// # Errors
-    /// [`RanDry`] when the converter has already passed the end of what was given before: it rests, and took nothing.
+    /// [`RanDry`] when the converter has already passed the end of the previous codes: it is at
+    /// rest and has accepted nothing.
     fn play(&mut self, codes: &[i16]) -> Result<(), RanDry>;
 
-    /// To rest at once, whatever was given before.
+    /// Goes to rest immediately and discards all codes given before.
     fn rest(&mut self);
 }
 
-/// The drive was given its codes too late.
+/// Codes were given to the drive too late.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RanDry;
@@ -151,20 +160,20 @@ impl Drive for NoDrive {
     fn rest(&mut self) {}
 }
 
-/// Inputs at the rig that no host can overrule.
+/// Inputs at the rig that a host cannot override.
 pub trait Inputs {
     /// Whether the guard is closed.
     fn interlock_closed(&mut self) -> bool;
     /// Whether the emergency stop is pressed.
     fn emergency_stop(&mut self) -> bool;
-    /// Whether somebody at the rig resets a released emergency stop.
+    /// Whether a released emergency stop is being reset at the rig.
     fn local_reset(&mut self) -> bool;
-    /// What is wrong with the guard chain, for the host: once for each thing that is.
+    /// A fault of the guard chain to be reported to the host; each fault is returned once.
     fn fault(&mut self) -> Option<&'static str> {
         None
     }
-    /// The specimen's temperature and the bias of sensors that are fed with a constant current, when they were measured since this was
-    /// asked last: some ten times a second. None on a board that has neither.
+    /// The specimen's temperature and the bias of sensors fed with a constant current, if measured
+    /// since the last call (about ten times a second). `None` on a board that has neither.
     fn slow(&mut self) -> Option<Slow> {
         None
     }
@@ -172,30 +181,30 @@ pub trait Inputs {
 
 /// Bytes from the host.
 pub trait ByteSource {
-    /// Waits for at least one byte and returns how many were written; 0 when the link was cut: what was
-    /// gathered of a frame is dropped, and everything that moves comes to rest.
+    /// Waits for at least one byte and returns how many were written to `buffer`; 0 when the link
+    /// was cut. A partly received frame is then dropped, and everything that moves comes to rest.
     fn read(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize>;
 }
 
 /// Bytes to the host.
 pub trait ByteSink {
-    /// Waits until the link has taken all bytes (one whole frame), or was cut.
+    /// Waits until the link has accepted all bytes (one whole frame) or was cut.
     fn write(&mut self, frame: &[u8]) -> impl Future<Output = ()>;
 }
 
-/// Who moves hammer and laser. Only a simulated rig can be told through the link.
+/// Positions hammer and laser. Only a simulated rig can be positioned through the link.
 pub trait Stage {
     /// Whether [`Stage::go`] can succeed.
     const PRESENT: bool;
 
-    /// Puts hammer and laser in place, from the next scan on.
+    /// Positions hammer and laser, effective from the next scan.
     ///
     /// # Errors
     /// A [`Refusal`] for the host.
     fn go(&mut self, place: &Place) -> Result<(), Refusal>;
 }
 
-/// A rig whose hammer and laser are moved by people.
+/// A rig whose hammer and laser are positioned manually.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoStage;
 

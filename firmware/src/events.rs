@@ -1,21 +1,22 @@
-//! Events that wait for the link, and which of them give way when the queue is full.
+//! Queue of events waiting for the link, and the rule for which events are dropped when it is full.
 //!
-//! The queue has a fixed length, and a link may be slower than what happens. When the queue is full, the oldest event of
-//! the lowest rank is dropped, so that counters never displace the state of guard or emergency stop. Lost
-//! scans do not wait here but in the ring ([`crate::ring::Ring::take_loss`]), and are numbered as they are sent.
+//! The queue has a fixed length, and events may occur faster than the link can send them. When the
+//! queue is full, the oldest event of the lowest rank is dropped, so that counters never displace
+//! the state of guard or emergency stop. Lost scans do not wait here but in the ring
+//! ([`crate::ring::Ring::take_loss`]), and are numbered when they are sent.
 
 use heapless::Vec;
 use jointrig_protocol::event::{Event, Numbered};
 
-/// Events that wait for the link.
+/// Capacity of the event queue.
 pub const EVENTS: usize = 16;
 
-/// How much is lost with an event; the lowest is dropped first.
+/// Importance of an event; the lowest rank is dropped first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
-    /// Sent again within a second, or counted by its own numbers.
+    /// Sent again within a second, or its loss is visible from its own numbers.
     Repeated,
-    /// The result of an order, which the status tells as well.
+    /// The result of a request, which the status also contains.
     Ordered,
     /// A fault of the board, reported once.
     Fault,
@@ -37,12 +38,12 @@ fn rank(event: &Event) -> Rank {
     }
 }
 
-/// Whether an event says the same kind of thing as another one.
+/// Whether two events are of the same kind.
 fn same_kind(one: &Event, other: &Event) -> bool {
     core::mem::discriminant(one) == core::mem::discriminant(other)
 }
 
-/// An event that waits, and the scan at which it happened.
+/// A queued event, and the scan at which it happened.
 struct Waiting {
     at_scan: u64,
     event: Event,
@@ -51,7 +52,8 @@ struct Waiting {
 /// The queue, the oldest event first.
 pub struct Events {
     waiting: Vec<Waiting, EVENTS>,
-    /// Number of the next event to be sent. A dropped event uses up a number, so that the host sees a jump.
+    /// Number of the next event to be sent. A dropped event consumes a number, so that the host
+    /// detects a jump.
     next: u32,
 }
 
@@ -61,15 +63,16 @@ impl Events {
         Self { waiting: Vec::new(), next: 0 }
     }
 
-    /// Whether no event waits.
+    /// Whether the queue is empty.
     pub fn is_empty(&self) -> bool {
         self.waiting.is_empty()
     }
 
-    /// Queues an event; returns how many were dropped for lack of space: 0 or 1, this one or an older one.
+    /// Queues an event. Returns the number of events dropped for lack of space: 0 or 1, this one or
+    /// an older one.
     pub fn push(&mut self, at_scan: u64, event: Event) -> u32 {
         if matches!(event, Event::Counters(_)) {
-            // only the newest counters say anything: older ones that still wait lose nothing
+            // only the newest counters matter; replacing older ones loses nothing
             self.waiting.retain(|waiting| !same_kind(&waiting.event, &event));
         }
         let mut dropped = 0;
@@ -81,16 +84,16 @@ impl Events {
                 None => return dropped,
             }
         }
-        // a full queue has dropped one above
+        // there is space: a full queue has dropped an event above
         drop(self.waiting.push(Waiting { at_scan, event }));
         dropped
     }
 
-    /// The place of the event that gives way to `event` in a full queue; none where `event` itself is to be
-    /// dropped.
+    /// Index of the event to drop in favour of `event` in a full queue; `None` when `event` itself
+    /// is to be dropped.
     fn dispensable(&self, event: &Event) -> Option<usize> {
         let ranks = self.waiting.iter().map(|waiting| rank(&waiting.event)).enumerate();
-        // of equal ranks the first one, which is the oldest
+        // among equal ranks the first one, which is the oldest
         let (place, lowest) = ranks.min_by_key(|(_, rank)| *rank)?;
         if lowest < rank(event) {
             return Some(place);
@@ -98,7 +101,8 @@ impl Events {
         if rank(event) < Rank::Safety {
             return None;
         }
-        // nothing but states of guard and stop: the oldest one that a newer one of its kind replaces
+        // only states of guard and stop remain: drop the oldest one that is superseded by a newer
+        // one of its kind
         let after = |place: usize| self.waiting.iter().skip(place + 1).map(|waiting| &waiting.event);
         (0..self.waiting.len()).find(|place| {
             let own = &self.waiting[*place].event;
@@ -106,7 +110,7 @@ impl Events {
         })
     }
 
-    /// Takes the oldest event, numbered for the link.
+    /// Takes the oldest event and numbers it.
     pub fn pop(&mut self) -> Option<Numbered> {
         if self.waiting.is_empty() {
             return None;
@@ -115,15 +119,16 @@ impl Events {
         Some(self.number(at_scan, event))
     }
 
-    /// Numbers an event that is sent without waiting here.
+    /// Numbers an event that is sent without being queued here.
     pub fn number(&mut self, at_scan: u64, event: Event) -> Numbered {
         let number = self.next;
         self.next = self.next.wrapping_add(1);
         Numbered { number, at_scan, event }
     }
 
-    /// A new session begins: what concerned the session before is dropped, because the new host would take
-    /// it for the result of its own orders. Faults and the states of guard and stop wait for the new host.
+    /// Starts a new session: events that concern the previous session are dropped, because the new
+    /// host would take them for results of its own requests. Faults and the states of guard and
+    /// stop are kept for the new host.
     pub fn begin_session(&mut self) {
         self.waiting.retain(|waiting| match rank(&waiting.event) {
             Rank::Repeated | Rank::Ordered => false,
@@ -163,7 +168,8 @@ mod tests {
             assert_eq!(events.push(scan, Event::Fault(String::new())), 0);
         }
         assert_eq!(events.push(20, Event::Armed), 0);
-        // the result of an order gives way, and is itself dropped where nothing is less important
+        // the result of a request is displaced, and is itself dropped when nothing in the queue is
+        // less important
         assert_eq!(events.push(21, Event::Interlock(false)), 1);
         assert_eq!(events.push(22, Event::Disarmed(Reason::Interlock)), 1);
         assert_eq!(events.push(23, Event::EmergencyStop(true)), 1);

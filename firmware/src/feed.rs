@@ -1,9 +1,10 @@
-//! Feed: codes for a converter that plays a ring of words for ever, one word per scan.
+//! Supplies codes to a converter that cyclically plays a ring of words, one word per scan.
 //!
-//! Two channels of the board's DMA go round the ring, one step with every scan: the player takes a word to the
-//! converter, and [`TRAIL`] words behind it the eraser writes rest over what was played. So every word is played
-//! once, and what follows the last one given is rest, whether or not any program still runs. This file is
-//! the arithmetic of it: where the next codes go, and whether they come in time.
+//! Two DMA channels of the board go round the ring, one step per scan: the player sends a word to
+//! the converter, and the eraser, [`TRAIL`] words behind it, overwrites played words with the rest
+//! value. Every word is thus played once, and rest follows the last code given, whether or not any
+//! program still runs. This file contains the index arithmetic: where the next codes go, and
+//! whether they are in time.
 //!
 //! ```text
 //!            TRAIL          AHEAD
@@ -13,45 +14,47 @@
 
 use crate::board::RanDry;
 
-/// Words in the ring: 5 ms of 51.2 kHz, a power of two so that the count of scans may wrap.
+/// Words in the ring: 5 ms at 51.2 kHz, a power of two so that the count of scans may wrap.
 pub const RING: u32 = 256;
-/// From rest, the first code is played so many scans later: four blocks of 15, 1.2 ms. Blocks may come late by
-/// as much, less [`AHEAD`].
+/// From rest, the first code is played this many scans later: four blocks of 15 scans, 1.2 ms.
+/// Blocks may be late by this time minus [`AHEAD`].
 pub const LEAD: u32 = 60;
-/// Words that the player may have taken early, and those that pass while a block's codes are written.
+/// Margin for words that the player has fetched early and for those played while a block's codes
+/// are being written.
 pub const AHEAD: u32 = 16;
 /// How far the eraser is behind the player.
 pub const TRAIL: u32 = 16;
-/// The word of 0 V: the middle of a converter of twelve bits.
+/// The word for 0 V: mid-scale of a twelve-bit converter.
 pub const REST: u32 = 1 << 11;
-/// Steps of the converter between 0 V and a code of 32 768: 39 % of its range to either side, because an output
-/// buffer is not linear within 0.2 V of its supply.
+/// Converter steps between 0 V and a code of 32 768: 39 % of its range to either side, because an
+/// output buffer is not linear within 0.2 V of its supply rails.
 pub const SPAN: u32 = 1600;
 /// Steps at the largest code.
 pub const FULL_SCALE_STEPS: f32 = i16::MAX as f32 * SPAN as f32 / 32_768.0;
 
 const _: () = assert!(RING.is_power_of_two() && LEAD > AHEAD);
-/// Parts of a step in which a code is exact: 32 768 codes are 1600 steps, a code is 25 parts of 512.
+/// Fractions per converter step in which a code is exact: 32 768 codes are 1600 steps, so a code is
+/// 25/512 of a step.
 const PARTS: i32 = 512;
 const PARTS_PER_CODE: i32 = 25;
 const _: () = assert!(SPAN.cast_signed() * PARTS == 32_768 * PARTS_PER_CODE);
 
-/// The ring's memory, which the DMA shares.
+/// The ring's memory, shared with the DMA.
 pub trait Words {
     /// The word at a place below [`RING`].
     fn get(&self, place: usize) -> u32;
-    /// Writes it.
+    /// Writes the word at a place.
     fn set(&mut self, place: usize, word: u32);
 }
 
-/// Where the next codes go.
+/// Position of the next codes in the ring.
 #[derive(Clone, Debug, Default)]
 pub struct Feed {
-    /// The scan after the last one that was given a code; none at rest.
+    /// The scan after the last one that was given a code; `None` at rest.
     end: Option<u32>,
-    /// Nothing belongs to what was given any more.
+    /// The motion has ended: the next codes begin a new one.
     ended: bool,
-    /// What rounding has left over, in parts of a step.
+    /// Remainder of the rounding, in fractions of a step.
     owed: i32,
 }
 
@@ -61,13 +64,14 @@ impl Feed {
         Self { end: None, ended: false, owed: 0 }
     }
 
-    /// Puts codes behind those given before, or [`LEAD`] scans ahead when there are none or when they have ended.
-    /// No codes are an end. `now` counts the words that the player has taken since it began at the ring's
-    /// first; it may wrap.
+    /// Places codes after those given before, or [`LEAD`] scans ahead when there are none or when
+    /// the motion has ended. An empty slice ends the motion. `now` is the number of words that the
+    /// player has taken since it began at the ring's first; it may wrap.
     ///
     /// # Errors
-    /// [`RanDry`], with the whole ring at rest: when the player has reached the end of what was given before,
-    /// when so much was given that it would meet what is not yet erased, or when the eraser has not erased.
+    /// [`RanDry`], with the whole ring set to rest: when the player has reached the end of the
+    /// previous codes, when there are so many codes that they would overlap words not yet erased,
+    /// or when the eraser has not erased.
     pub fn play(&mut self, now: u32, codes: &[i16], words: &mut impl Words) -> Result<(), RanDry> {
         if codes.is_empty() {
             self.ended = true;
@@ -93,7 +97,7 @@ impl Feed {
         Ok(())
     }
 
-    /// Rest everywhere; the next codes are a start.
+    /// Sets the whole ring to rest; the next codes begin a new motion.
     pub fn rest(&mut self, words: &mut impl Words) {
         for place in 0..RING as usize {
             words.set(place, REST);
@@ -101,8 +105,9 @@ impl Feed {
         *self = Self::new();
     }
 
-    /// A code's word. What is rounded off is added to the next, so that the mean of some words is finer than a
-    /// step; the noise of it lies at high frequencies, which the filter behind the converter takes.
+    /// The word for a code. The rounding remainder is carried to the next code, so that the mean
+    /// over several words is finer than a step; the resulting noise is at high frequencies, which
+    /// the filter after the converter removes.
     fn word(&mut self, code: i16) -> u32 {
         let exact = i32::from(code) * PARTS_PER_CODE + self.owed;
         let steps = (exact + PARTS / 2).div_euclid(PARTS);
@@ -123,7 +128,7 @@ mod tests {
 
     use super::*;
 
-    /// Words that the fake player takes before their scan, as a DMA with a small buffer does.
+    /// Words that the simulated player takes before their scan, as a DMA with a small buffer does.
     const EARLY: u32 = 4;
     const BLOCK: usize = 15;
 
@@ -139,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Player and eraser, a step per scan.
+    /// Simulated player and eraser, one step per scan.
     struct Converter {
         memory: Memory,
         now: u32,
@@ -148,7 +153,7 @@ mod tests {
     }
 
     impl Converter {
-        /// With its count of scans at a multiple of the ring's length.
+        /// Starts with its count of scans at a multiple of the ring's length.
         fn at(now: u32) -> Self {
             assert_eq!(now % RING, 0);
             Self { memory: Memory([REST; RING as usize]), now, erases: true, played: Vec::new() }
@@ -166,7 +171,7 @@ mod tests {
             (0..count).for_each(|_| self.scan());
         }
 
-        /// What was played, without the rest before and after it.
+        /// The words played, without the rest before and after them.
         fn heard(&self) -> &[u32] {
             let first = self.played.iter().position(|word| *word != REST).unwrap_or(self.played.len());
             let last = self.played.iter().rposition(|word| *word != REST).map_or(first, |last| last + 1);
@@ -192,7 +197,7 @@ mod tests {
 
     #[test]
     fn codes_are_played_in_order_once_and_rest_follows() {
-        // the count of scans wraps in the midst of the third run
+        // the count of scans wraps during the third run
         for start in [0, RING, 0_u32.wrapping_sub(3 * RING)] {
             let mut converter = Converter::at(start);
             let mut feed = Feed::new();
@@ -201,7 +206,7 @@ mod tests {
                 feed.play(converter.now, &block, &mut converter.memory).expect("in time");
                 converter.scans(BLOCK as u32);
             }
-            // nobody feeds any more, for many rounds
+            // no codes are supplied for several rounds
             converter.scans(10 * RING);
             assert_eq!(converter.heard(), words);
             assert!(converter.memory.0.iter().all(|word| *word == REST));
@@ -225,7 +230,8 @@ mod tests {
         let (mut blocks, words) = song(1 + 4 * 20);
         feed.play(converter.now, &blocks.next().expect("a block"), &mut converter.memory).expect("in time");
         for _ in 0..20 {
-            // one block late after the other, until all four come: LEAD + BLOCK - 4 * BLOCK is below AHEAD
+            // codes are up to three blocks late, then catch up: LEAD + BLOCK - 4 * BLOCK would be
+            // below AHEAD
             converter.scans(3 * BLOCK as u32);
             for block in blocks.by_ref().take(3) {
                 feed.play(converter.now, &block, &mut converter.memory).expect("in time");
@@ -250,7 +256,7 @@ mod tests {
             assert_eq!(again, if taken { Ok(()) } else { Err(RanDry) }, "after {wait}");
             let waiting = converter.memory.0.iter().any(|word| *word != REST);
             assert_eq!(waiting, taken, "after {wait}");
-            // what comes next is a start, a lead ahead
+            // the next codes begin a new motion, LEAD scans ahead
             if !taken {
                 let from = converter.now;
                 converter.played.clear();
@@ -315,7 +321,7 @@ mod tests {
                 converter.scans(BLOCK as u32);
             }
             converter.scans(2 * RING);
-            // all of both, in order; between them rest, and not more than the pause makes
+            // all words of both motions, in order; between them rest, no longer than the pause
             let heard: Vec<u32> = converter.heard().iter().copied().filter(|word| *word != REST).collect();
             assert_eq!(heard, words, "after {pause}");
             assert!(converter.heard().len() <= words.len() + pause as usize, "after {pause}");
@@ -336,7 +342,8 @@ mod tests {
         for (code, word) in [(0, REST), (i16::MIN, REST - SPAN), (i16::MAX, REST + SPAN), (16_384, 2848)] {
             assert_eq!(Feed::new().word(code), word, "{code}");
         }
-        // a code of 5 is a quarter of a step: 64 of them are 15.625 steps, and no word is two steps off
+        // a code of 5 is a quarter of a step: 64 of them are 15.625 steps, and no word deviates by
+        // a whole step
         for code in [5_i16, -5, 1, 17, -1234] {
             let mut feed = Feed::new();
             let steps: Vec<i32> =

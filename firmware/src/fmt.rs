@@ -1,4 +1,4 @@
-//! Log lines: `defmt` on a board, `log` on a PC, nothing when neither is chosen.
+//! Log macros: `defmt` on a board, `log` on a PC, no output when neither feature is enabled.
 #![allow(unused_macros, reason = "one set of macros for every level, whether or not each is used today")]
 
 macro_rules! info {

@@ -1,8 +1,8 @@
 //! The friction force T from the load cells that ground substructure B.
 //!
-//! Three cells share the force; a 3 × 3 calibration matrix takes their readings (N) to forces (N), and T
-//! is the sum of the three. Since T is linear in the readings, the sum of the matrix's columns is formed
-//! once, and each scan costs three multiplications.
+//! Three cells share the force; a 3 × 3 calibration matrix converts their readings (N) to forces
+//! (N), and T is the sum of the three. Since T is linear in the readings, the column sums of the
+//! matrix are computed once, and each scan costs three multiplications.
 
 use jointrig_hot::column;
 use jointrig_protocol::channel::{Channel, Role};
@@ -11,16 +11,16 @@ use nalgebra::{Matrix3, RowVector3, Vector3};
 /// Cells that share the friction force.
 pub const CELLS: usize = 3;
 
-/// From codes of the load cells to T.
+/// Converts codes of the load cells to T.
 #[derive(Clone, Debug)]
 pub struct Friction {
-    /// Places of the cells in the scan.
+    /// Indices of the cells in the scan.
     places: [usize; CELLS],
     /// N per code of each cell.
     newtons_per_code: Vector3<f32>,
     /// Sums of the calibration matrix's columns.
     columns: RowVector3<f32>,
-    /// N per code of each cell, through the calibration.
+    /// N per code of each cell, calibration included.
     weights: RowVector3<f32>,
 }
 
@@ -44,13 +44,13 @@ impl Friction {
         Some(friction)
     }
 
-    /// Takes a calibration matrix: forces = matrix × readings.
+    /// Sets the calibration matrix: forces = matrix × readings.
     pub fn calibrate(&mut self, matrix: &Matrix3<f32>) {
         self.columns = RowVector3::repeat(1.0) * matrix;
         self.weigh();
     }
 
-    /// Takes other scales; the matrix stays.
+    /// Sets other scales; the matrix is unchanged.
     pub(crate) fn judge_by(&mut self, scales: &[f32]) {
         for (newtons_per_code, place) in self.newtons_per_code.iter_mut().zip(self.places) {
             *newtons_per_code = scales[place];
@@ -62,7 +62,8 @@ impl Friction {
         self.weights = self.columns.component_mul(&self.newtons_per_code.transpose());
     }
 
-    /// The mean of T over some scans of so many channels, N: since T is linear in the codes, they are summed as they are.
+    /// The mean of T over some scans with `channels` channels each, N. The raw codes are summed,
+    /// since T is linear in them.
     pub fn mean_of(&self, codes: &[[u8; 2]], channels: usize) -> f32 {
         let sums = self.places.map(|place| column::sum(codes, channels, place) as f32);
         (self.weights * Vector3::from(sums)).x * channels as f32 / codes.len() as f32

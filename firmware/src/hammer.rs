@@ -1,15 +1,17 @@
 //! The hammer's state machine: disarmed, armed, waiting, firing, listening, hold-off.
 //!
 //! ```text
-//! Disarmed ──arm──▶ Armed ──fire──▶ Waiting ──quiet──▶ Firing ──contact──▶ Listening ──▶ HoldOff ──▶ Disarmed
-//!     ▲               │ expires        │ expires, disarm,  │ no contact                    ▲
-//!     └───────────────┴────────────────┘ not quiet         └───────────────────────────────┘
+//! Disarmed ─arm─▶ Armed ─fire─▶ Waiting ─quiet─▶ Firing ─contact─▶ Listening ─▶ HoldOff
+//!    ▲              │ expires      │ expires,      │ no contact                   ▲ │
+//!    ├──────────────┴──────────────┘ disarm,       └──────────────────────────────┘ │
+//!    │                               not quiet                                      │
+//!    └──────────────────────────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! It is driven by scans alone, so that a shot happens at the same place in the record whatever the
-//! executor does. It never touches the coil: each block yields at most one [`CoilOrder`], which the
-//! acquisition task carries out. One arming allows one shot. The pulse's length is bounded here, again by
-//! the board's cap, and a last time by the hardware.
+//! It is driven by scans only, so that a shot happens at the same place in the record regardless of
+//! the executor's timing. It never accesses the coil: each block yields at most one [`CoilOrder`],
+//! which the acquisition task carries out. One arming allows one shot. The pulse length is bounded
+//! here, again by the board's cap, and finally by the hardware.
 
 use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::{Channel, Role};
@@ -24,23 +26,24 @@ use crate::quiet::Quiet;
 use crate::scales::{UnitsPerCode, as_built};
 use crate::scan_time::{ms_of_scans, scans_in_ms};
 
-/// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is a little shorter (docs/WIRING.md): a pulse within it would
-/// be lost in hardware, so the shot waits.
+/// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is slightly
+/// shorter (docs/WIRING.md): a pulse within that pause would be suppressed in hardware, so the shot
+/// is delayed.
 pub const PAUSE_MS: u32 = 600;
 
-/// What the coil must do now.
+/// An order for the coil.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CoilOrder {
-    /// One pulse of this many µs, from the next scan on.
+    /// One pulse of this many µs, starting with the next scan.
     Pulse(u32),
-    /// Off at once.
+    /// Switch off immediately.
     Off,
 }
 
-/// What came of one block.
+/// Result of one block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
-    /// For the coil.
+    /// Order for the coil.
     pub coil: Option<CoilOrder>,
     /// A shot that reached a new phase.
     pub shot: Option<Shot>,
@@ -50,13 +53,13 @@ pub struct Outcome {
     pub trigger: bool,
 }
 
-/// One block of codes, as the machine reads it.
+/// One block of codes, as the state machine reads it.
 pub trait Scanned {
     /// Index of the first scan.
     fn first_scan(&self) -> u64;
-    /// How many scans.
+    /// Number of scans.
     fn scans(&self) -> usize;
-    /// The code of a channel in the `scan`-th scan.
+    /// The code of a channel in scan `scan` of the block.
     fn code(&self, scan: usize, channel: usize) -> i16;
 }
 
@@ -69,7 +72,7 @@ enum State {
     HoldOff { until: u64 },
 }
 
-/// The machine.
+/// The hammer's state machine.
 pub struct Hammer {
     rate_hz: u32,
     cap_us: u32,
@@ -79,14 +82,15 @@ pub struct Hammer {
     state: State,
     shot: Option<Shot>,
     last_number: u32,
-    /// The rest after the last shot ends here.
+    /// End of the hold-off time after the last shot.
     rested_at: u64,
-    /// The coil's pause after the last pulse ends here.
+    /// End of the coil's pause after the last pulse.
     coil_free_at: u64,
 }
 
 impl Hammer {
-    /// Disarmed. The force channel is the one of role [`Role::HammerForce`]; without one, no shot is allowed.
+    /// A disarmed hammer. The force channel is the one with the role [`Role::HammerForce`]; without
+    /// one, no shot is allowed.
     pub fn new(channels: &[Channel], rate_hz: u32, cap_us: u32) -> Self {
         let force = channels.iter().position(|channel| channel.role == Role::HammerForce);
         Self {
@@ -108,12 +112,12 @@ impl Hammer {
         }
     }
 
-    /// Judges by these scales from now on.
+    /// Uses these scales from now on.
     pub(crate) fn judge_by(&mut self, scales: &UnitsPerCode) {
         self.units_per_code.clone_from(scales);
     }
 
-    /// What it does, in the protocol's words.
+    /// Its state, in the protocol's terms.
     pub fn state(&self) -> answer::Hammer {
         match self.state {
             State::Disarmed => answer::Hammer::Disarmed,
@@ -125,12 +129,12 @@ impl Hammer {
         }
     }
 
-    /// The place of the force that it is judged by.
+    /// Index of the force channel used.
     pub fn force_channel(&self) -> Option<usize> {
         self.force
     }
 
-    /// Whether a block is nothing to it: it is disarmed, and nothing is followed.
+    /// Whether the hammer is disarmed; blocks are then ignored.
     #[inline]
     pub fn is_disarmed(&self) -> bool {
         matches!(self.state, State::Disarmed)
@@ -146,17 +150,17 @@ impl Hammer {
         }
     }
 
-    /// The last shot since the device started, of whichever session: its number and all below are used up,
-    /// so that no word of an old shot is taken for one of a new shot.
+    /// The last shot since the device started, of any session. Its number and all lower ones are
+    /// used up, so that a message about an old shot is never taken for one about a new shot.
     pub fn shot(&self) -> Option<Shot> {
         self.shot
     }
 
-    /// How the pulse is recognised.
+    /// Sets how the pulse is recognised.
     ///
     /// # Errors
-    /// [`Refusal::OutOfBounds`] when the level is not a positive force or a time is longer than a minute;
-    /// [`Refusal::Busy`] while a shot is in hand.
+    /// [`Refusal::OutOfBounds`] when the level is not a positive force, a time is longer than a
+    /// minute or the listening time is 0; [`Refusal::Busy`] while a shot is in progress.
     pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), Refusal> {
         if matches!(self.state, State::Waiting { .. } | State::Firing { .. } | State::Listening { .. }) {
             return Err(Refusal::Busy);
@@ -178,8 +182,8 @@ impl Hammer {
     /// Allows one shot until `valid_ms` from now.
     ///
     /// # Errors
-    /// [`Refusal::OutOfBounds`] for no or too long a time; [`Refusal::Busy`] while a shot is in hand;
-    /// [`Refusal::Unsupported`] without a force channel.
+    /// [`Refusal::OutOfBounds`] for a time of 0 or above the cap; [`Refusal::Busy`] while a shot is
+    /// in progress; [`Refusal::Unsupported`] without a force channel.
     pub fn arm(&mut self, now: u64, valid_ms: u32) -> Result<(), Refusal> {
         if self.force.is_none() {
             return Err(Refusal::Unsupported);
@@ -188,7 +192,7 @@ impl Hammer {
             return Err(crate::refusal::out_of_bounds("arming must be valid for 1 to 60000 ms"));
         }
         match self.state {
-            // the rest after a shot does not forbid arming: the next shot waits for its end
+            // arming is allowed during the hold-off time: the next shot waits for its end
             State::Disarmed | State::Armed { .. } | State::HoldOff { .. } => {
                 let until = now + scans_in_ms(valid_ms, self.rate_hz);
                 self.state = State::Armed { until };
@@ -201,8 +205,8 @@ impl Hammer {
     /// Accepts one shot.
     ///
     /// # Errors
-    /// [`Refusal::NotArmed`], [`Refusal::Busy`], [`Refusal::PulseOutOfBounds`], [`Refusal::ShotRepeated`],
-    /// or [`Refusal::OutOfBounds`] for limits that are not finite.
+    /// [`Refusal::NotArmed`], [`Refusal::Busy`], [`Refusal::PulseOutOfBounds`],
+    /// [`Refusal::ShotRepeated`], or [`Refusal::OutOfBounds`] for limits that are not finite.
     pub fn fire(&mut self, order: &Fire) -> Result<(), Refusal> {
         let until = match self.state {
             State::Armed { until } => until,
@@ -249,8 +253,9 @@ impl Hammer {
         Ok(())
     }
 
-    /// Takes back arming and a shot whose coil is not on yet; ends a pulse that is on when `reason` is not
-    /// merely that the host asked. A bolt in flight cannot be taken back, and its record goes on.
+    /// Cancels the arming and a shot whose coil is not on yet; ends an active pulse unless the
+    /// reason is a mere request of the host ([`Reason::Asked`]). A bolt in flight cannot be
+    /// stopped, and recording of it continues.
     pub fn disarm(&mut self, reason: Reason) -> Outcome {
         let mut outcome = Outcome::default();
         match self.state {
@@ -281,7 +286,7 @@ impl Hammer {
         self.state = State::HoldOff { until: self.rested_at };
     }
 
-    /// Takes one block.
+    /// Processes one block.
     pub fn block(&mut self, block: &impl Scanned, friction: Option<&Friction>) -> Outcome {
         let first = block.first_scan();
         let end = first + block.scans() as u64;
@@ -325,7 +330,7 @@ impl Hammer {
         }
         if calm {
             let pulse_us = self.shot.map_or(0, |shot| shot.pulse_us);
-            // at most 8 ms, so that the product has 32 bits up to 536 kHz
+            // at most 8 ms, so that the product fits 32 bits up to 536 kHz
             let pulse_scans = u64::from(pulse_us * self.rate_hz / 1_000_000) + 1;
             if let Some(shot) = &mut self.shot {
                 shot.fired_at = end;

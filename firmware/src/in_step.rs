@@ -1,30 +1,30 @@
-//! Clock of the scans, sync input and sync output as the device's state holds them.
+//! Part of the device's state: scan clock, sync input and sync output.
 
 use jointrig_protocol::sync::{Clock, ClockFault, Line, Sync};
 
 use crate::ruler::ClockWatch;
 
-/// What is known of clock and edges, and what is to be done about them.
+/// State of clock and edges, and pending actions.
 #[derive(Default)]
 pub(crate) struct InStep {
-    /// Clock and counters, as the host is told.
+    /// Clock and counters, as reported to the host.
     pub now: Sync,
-    /// How good the external clock has been.
+    /// Quality of the external clock so far.
     pub watch: ClockWatch,
-    /// The board is to take this clock.
+    /// The board must select this clock.
     pub order: Option<Clock>,
-    /// The output is to pulse for this.
+    /// The sync output must pulse for this.
     pub due: Option<Line>,
 }
 
 impl InStep {
-    /// Whether the board has something to do.
+    /// Whether the board has a pending action.
     #[inline]
     pub fn is_due(&self) -> bool {
         self.order.is_some() | self.due.is_some()
     }
 
-    /// Begins with a clock: an external one has yet to prove good.
+    /// Selects a clock; an external one is unproven at first.
     pub fn take(&mut self, clock: Clock) {
         let fault = (clock != Clock::Internal).then_some(ClockFault::Unproven);
         self.now = Sync { clock, fault, ppm: 0.0, ..self.now };

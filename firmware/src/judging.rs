@@ -1,4 +1,5 @@
-//! Which scales hammer, shaker and load cells are judged by: those of the board, or those that a session brought.
+//! Selects the scales used for hammer, shaker and load cells: those of the board, or those sent in
+//! the session.
 
 use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::Channel;
@@ -7,10 +8,11 @@ use crate::scales::{UnitsPerCode, as_built, as_told};
 use crate::state::State;
 
 impl State<'_> {
-    /// Judges by these scales from now on.
+    /// Uses these scales from now on.
     ///
     /// # Errors
-    /// [`Refusal::OutOfBounds`]; [`Refusal::HammerArmed`] or [`Refusal::ShakerRuns`] while something may move by the old ones.
+    /// [`Refusal::OutOfBounds`]; [`Refusal::HammerArmed`] or [`Refusal::ShakerRuns`] while
+    /// something may move based on the old scales.
     pub fn take_scales(&mut self, channels: &[Channel], units_per_volt: &[f32]) -> Result<(), Refusal> {
         let scales = as_told(channels, units_per_volt)?;
         match self.hammer.state() {
@@ -25,7 +27,7 @@ impl State<'_> {
         Ok(())
     }
 
-    /// Forgets what a session said of the scales.
+    /// Restores the built-in scales if a session has changed them.
     pub fn forget_scales(&mut self, channels: &[Channel]) {
         if core::mem::take(&mut self.scales_told) {
             self.judge_by(&as_built(channels));

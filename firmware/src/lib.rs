@@ -1,18 +1,23 @@
-//! The rig's controller above its board: acquisition, hammer, shaker, link and safety.
+//! The hardware-independent part of the rig's controller: acquisition, hammer, shaker, link and
+//! safety.
 //!
-//! The same code runs on the controller, in the emulator and inside the simulator. It owns no static, no
-//! executor, no time driver and no logger: a board makes one [`Core`] and runs the four asynchronous
-//! functions that borrow it, each in a task of its own:
+//! The same code runs on the controller, in the emulator and in the simulator. It contains no
+//! static, no executor, no time driver and no logger: a board creates one [`Core`] and runs the
+//! four asynchronous functions that borrow it, each in a separate task:
 //!
-//! | function | what it does | when it is late |
-//! |---|---|---|
-//! | [`acquire::acquire`] | takes blocks of scans from the converters, judges them for the hammer, puts them in the ring | the front end counts missed scans; they are reported as lost ranges |
-//! | [`receive::receive`] | finds frames in incoming bytes and carries out requests | the host asks again |
-//! | [`transmit::transmit`] | sends answers first, then events, then blocks sent again, then new blocks, then log lines | blocks wait in the ring; what leaves it unsent is reported as lost |
-//! | [`watch::watch`] | disarms hammer and stops shaker when the host falls silent, reports counters | – |
+//! - [`acquire::acquire`] takes blocks of scans from the converters, evaluates them for the hammer
+//!   and puts them into the ring. When it is late, the front end counts missed scans; they are
+//!   reported as lost ranges.
+//! - [`receive::receive`] finds frames in incoming bytes and carries out requests. When it is late,
+//!   the host asks again.
+//! - [`transmit::transmit`] sends replies first, then events, then retransmitted blocks, then new
+//!   blocks, then log lines. When it is late, blocks wait in the ring; those that leave it unsent
+//!   are reported as lost.
+//! - [`watch::watch`] disarms the hammer and stops the shaker when the host falls silent, and
+//!   reports counters.
 //!
-//! The scan index is the only clock for results; `embassy-time` serves timeouts. Results never depend on
-//! the order in which an executor polls the four.
+//! The scan index is the only time base for results; `embassy-time` is used for timeouts. Results
+//! never depend on the order in which an executor polls the four tasks.
 #![no_std]
 #![forbid(unsafe_code)]
 

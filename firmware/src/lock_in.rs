@@ -1,15 +1,16 @@
-//! The lock-in: amplitude of one frequency in a signal, over whole cycles.
+//! Lock-in: the amplitude of one frequency in a signal, measured over whole cycles.
 //!
-//! The signal is multiplied by sine and cosine of the drive's own angle and summed over whole cycles; what is not of
-//! that frequency averages out, an offset entirely. Sums are `f32` over some thousands of scans: each addition is good to 6e-8 of
-//! the sum, which after 10⁴ of them is 1e-5 of the amplitude at most and far less as a rule.
+//! The signal is multiplied by the sine and cosine of the drive's angle and summed over whole
+//! cycles. Components at other frequencies average out; an offset cancels completely. The sums are
+//! `f32` over some thousands of scans: each addition is accurate to 6e-8 of the sum, which after
+//! 10⁴ additions is at most 1e-5 of the amplitude, and usually much less.
 
 use crate::sine::sine;
 
 /// A quarter of a turn.
 const QUARTER: u32 = 1 << 30;
 
-/// What the signal times sine and cosine has come to, over so many scans.
+/// Sums of the signal times sine and cosine over a number of scans.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     in_phase: f32,
@@ -32,40 +33,41 @@ impl Sums {
     }
 }
 
-/// What was seen at the end of some whole cycles, in the signal's unit.
+/// Result after some whole cycles, in the signal's unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// Amplitude over the last few cycles: soon, and rough.
+    /// Amplitude over the last few cycles: available early, but coarse.
     pub glance: f32,
-    /// Amplitude over the whole measurement, when that is complete.
+    /// Amplitude over the whole measurement, when it is complete.
     pub whole: Option<f32>,
 }
 
-/// The sums of a measurement and of the glance that is under way.
+/// The sums of the current measurement and of the current glance (short measurement).
 #[derive(Clone, Copy, Debug)]
 pub struct LockIn {
     glance: Sums,
     whole: Sums,
     glance_scans: u32,
     least_scans: u32,
-    /// A cycle has begun since it was asked for: a renewed order comes in the middle of one, and a part of a cycle has any amplitude.
+    /// A cycle has begun since the start: a renewed request arrives within a cycle, and a partial
+    /// cycle can have any amplitude.
     begun: bool,
 }
 
 impl LockIn {
-    /// Measures over the fewest whole cycles that take `least_scans` or more, and glances after the fewest that take
-    /// `glance_scans` or more.
+    /// Measures over the fewest whole cycles that last at least `least_scans` scans, and glances
+    /// after the fewest that last at least `glance_scans`.
     pub const fn new(glance_scans: u32, least_scans: u32) -> Self {
         Self { glance: Sums::NOTHING, whole: Sums::NOTHING, glance_scans, least_scans, begun: false }
     }
 
-    /// Forgets what was summed.
+    /// Discards the sums.
     pub fn restart(&mut self) {
         *self = Self::new(self.glance_scans, self.least_scans);
     }
 
-    /// Takes the signal of one scan at this angle, from which the next scan's differs by `step`. What is seen, when a
-    /// glance or a measurement is complete.
+    /// Adds the signal of one scan at this angle; the next scan's angle is larger by `step`.
+    /// Returns a result when a glance or a measurement is complete.
     pub fn feed(&mut self, signal: f32, angle: u32, step: u32) -> Option<Seen> {
         self.begun |= angle < step;
         if !self.begun {
@@ -86,7 +88,8 @@ impl LockIn {
     }
 }
 
-/// core has none, and micromath's is good to some per cent only: one step of Newton's makes 1e-3 of it, two 1e-6.
+/// `core` has no square root, and that of micromath is accurate to a few per cent only: one Newton
+/// step reduces the error to 1e-3, two to 1e-6.
 fn square_root(value: f32) -> f32 {
     #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
     use micromath::F32Ext;
@@ -125,14 +128,14 @@ mod tests {
         for phase in [0.0, 0.3, 1.7, 4.0] {
             let sine = |turns: f64| 2.5e-4 * (turns * core::f64::consts::TAU + phase).sin();
             let amplitude = measured(200.0, sine);
-            // the table-free sine's 4e-6 and the sums' rounding
+            // error of the table-free sine (4e-6) and rounding of the sums
             assert!((amplitude / 2.5e-4 - 1.0).abs() < 2e-5, "{amplitude}");
         }
     }
 
     #[test]
     fn whole_cycles_that_are_no_whole_scans_cost_little() {
-        // a cycle of 169.54 scans: the last one is cut by less than a scan of some 4200
+        // a cycle of 169.54 scans: the last one is truncated by less than one scan of about 4200
         let amplitude = measured(302.0, |turns| (turns * core::f64::consts::TAU + 0.7).sin());
         assert!((amplitude - 1.0).abs() < 5e-4, "{amplitude}");
     }
@@ -148,7 +151,8 @@ mod tests {
 
     #[test]
     fn a_glance_sees_a_change_that_the_measurement_still_averages() {
-        // 256 scans a cycle: two cycles a glance, sixteen a measurement; the amplitude doubles after eight
+        // 256 scans per cycle: two cycles per glance, sixteen per measurement; the amplitude
+        // doubles after eight cycles
         let step = jointrig_protocol::request::Shake::step_of(200.0, 51_200);
         let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), 0_u32);
         let mut seen = std::vec::Vec::new();
@@ -166,7 +170,8 @@ mod tests {
 
     #[test]
     fn what_begins_within_a_cycle_waits_for_the_next_one() {
-        // 2048 scans a cycle, of which four fifths are left: as a glance they would read a seventh too much or too little
+        // 2048 scans per cycle, of which four fifths remain: as a glance they would be wrong by a
+        // seventh
         let step = jointrig_protocol::request::Shake::step_of(25.0, 51_200);
         for phase in [0.0, 0.8, 1.6] {
             let (mut lock_in, mut angle) = (LockIn::new(512, 4_096), step.wrapping_mul(410));

@@ -1,19 +1,19 @@
 //! Lockstep: how an emulated board and the simulator that serves it share memory and take turns.
 //!
-//! The emulated board has real memory of its own and 16 MB that a process of the PC can map. What a wired
-//! board does with converters, coil, inputs and a USB port, it does through that memory: it writes an
-//! [`Ask`], rings, and stands still until the simulator has written a [`Reply`]. One of the two runs at
-//! any instant, and the board's time is what the reply says. So no clock of the PC enters any result, and
-//! the memory needs no other guard.
+//! The emulated board has its own memory and 16 MB that a process on the PC can map. Where a wired
+//! board uses converters, coil, inputs and a USB port, the emulated board uses this memory: it
+//! writes an [`Ask`], signals the simulator, and halts until the simulator has written a [`Reply`].
+//! Only one of the two runs at any time, and the board's time is the one in the reply. Therefore
+//! the PC's clock does not affect any result, and the memory needs no other protection.
 //!
-//! | offset | bytes | written by | what |
+//! | offset | bytes | written by | content |
 //! |---|---|---|---|
-//! | [`MAGIC_AT`] | 4 | simulator, once | [`MAGIC`]: somebody serves this memory |
+//! | [`MAGIC_AT`] | 4 | simulator, once | [`MAGIC`]: this memory is served |
 //! | [`ASK_AT`] | 64 | board | [`Ask`] |
 //! | [`REPLY_AT`] | 64 | simulator | [`Reply`] |
-//! | [`TEXT_AT`] | 4096 | whoever has the turn | [`Setup`], a stage order and its refusal, a last sentence |
+//! | [`TEXT_AT`] | 4096 | both, in turn | [`Setup`], stage request, refusal or panic message |
 //! | [`BLOCK_AT`] | 896 | simulator | a [`Delivery`], then the words of both converters |
-//! | [`SEEN_AT`] | 28 | simulator | what came to the sync port, with a [`Delivery`] that says so |
+//! | [`SEEN_AT`] | 28 | simulator | events at the sync port, if the [`Delivery`] announces them |
 //! | [`DRIVE_AT`] | 480 | board | codes for the shaker's drive |
 //! | [`TO_DEVICE_AT`] | 64 Ki | simulator | bytes for the board, a ring |
 //! | [`TO_HOST_AT`] | 64 Ki | board | bytes for the host, a ring |
@@ -30,85 +30,92 @@ use jointrig_protocol::channel::{Channel, Name};
 use jointrig_protocol::limits::MAX_CHANNELS;
 use serde::{Deserialize, Serialize};
 
-/// Where the board finds the memory.
+/// Address of the shared memory on the board.
 pub const BASE: usize = 0x8000_0000;
-/// Its size: QEMU insists on exactly this much.
+/// Size of the shared memory: QEMU requires exactly this size.
 pub const BYTES: usize = 16 << 20;
-/// Changes with this layout, so that an image and a simulator of different sources refuse each other.
+/// Changes with this layout, so that an image and a simulator built from different sources refuse
+/// each other.
 pub const MAGIC: u32 = 0x4A52_4C06;
-/// Where [`MAGIC`] stands.
+/// Offset of [`MAGIC`].
 pub const MAGIC_AT: usize = 0;
-/// Where the board's words stand.
+/// Offset of the board's [`Ask`].
 pub const ASK_AT: usize = 0x40;
-/// Where the simulator's words stand.
+/// Offset of the simulator's [`Reply`].
 pub const REPLY_AT: usize = 0x80;
-/// Where longer messages stand, their length in [`Ask::argument`] or [`Reply::length`].
+/// Offset of longer messages; their length is in [`Ask::argument`] or [`Reply::length`].
 pub const TEXT_AT: usize = 0x1000;
-/// The longest of them.
+/// Longest such message.
 pub const TEXT_BYTES: usize = 0x1000;
-/// Where a block of scans stands.
+/// Offset of a block of scans.
 pub const BLOCK_AT: usize = 0x2000;
 /// Output of the shaker's drive at the largest code, V.
 pub const DRIVE_FULL_SCALE_V: f32 = 10.0;
-/// Where codes for the shaker's drive stand, each of 16 bits.
+/// Offset of the codes for the shaker's drive, 16 bits each.
 pub const DRIVE_AT: usize = 0x3000;
-/// Where slow values stand ([`Slow`](jointrig_protocol::slow::Slow) in postcard), behind their length as a word.
+/// Offset of the slow values ([`Slow`](jointrig_protocol::slow::Slow) in postcard), preceded by
+/// their length as a word.
 pub const SLOW_AT: usize = 0x5000;
-/// The longest of them.
+/// Longest encoded slow values.
 pub const SLOW_BYTES: usize = 0x100;
-/// Where a [`Seen`] stands.
+/// Offset of a [`Seen`].
 pub const SEEN_AT: usize = 0x5800;
-/// Its words.
+/// Its length in words.
 pub const SEEN_WORDS: usize = 7;
-/// Counts of the simulated board's crystal in a scan, of which [`Seen::span`] speaks.
+/// Counts of the simulated board's crystal per scan, the unit of [`Seen::span`].
 pub const PERIOD: u32 = 3125;
-/// Slow values have been measured; it counts once, with the next block.
+/// Input bit: slow values have been measured; valid once, with the next block.
 pub const SLOW_MEASURED: u32 = 128;
-/// Where the ring of bytes for the board begins.
+/// Offset of the ring of bytes for the board.
 pub const TO_DEVICE_AT: usize = 0x1_0000;
-/// Where the ring of bytes for the host begins.
+/// Offset of the ring of bytes for the host.
 pub const TO_HOST_AT: usize = 0x2_0000;
-/// Where the ring of log lines begins.
+/// Offset of the ring of log lines.
 pub const LOG_AT: usize = 0x3_0000;
 /// The length of each ring, a power of two.
 pub const RING_BYTES: u32 = 0x1_0000;
-/// An instant that never comes.
+/// An instant that is never reached.
 pub const NEVER: u64 = u64::MAX;
 
-/// What the board wants when it rings.
+/// Operation that the board requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Op {
-    /// It has started and needs its [`Setup`]; the argument is the low word of its
+    /// The board has started and needs its [`Setup`]; the argument is the low word of its
     /// [`schema::HASH`](jointrig_protocol::schema::HASH).
     Start = 1,
-    /// All tasks wait: for a block, an alarm, bytes, or room for bytes. With an argument of 1 bytes come and go by
-    /// the UART, which the simulator does not see: it answers soon, whatever has come.
+    /// All tasks wait: for a block, an alarm, bytes, or space for bytes. With an argument of 1,
+    /// bytes are exchanged over the UART, which the simulator does not see; it then replies soon in
+    /// any case.
     Idle = 2,
-    /// The coil on, for as many µs as the argument says.
+    /// Switch the coil on, for the number of µs in the argument.
     Pulse = 3,
-    /// The coil off.
+    /// Switch the coil off.
     Off = 4,
-    /// The stage order of as many bytes as the argument says; the reply's length is that of a refusal, or 0.
+    /// A stage request; the argument is its length in bytes. The reply's length is that of a
+    /// refusal, or 0.
     Stage = 5,
-    /// The firmware has panicked; a sentence of as many bytes as the argument says tells why.
+    /// The firmware has panicked; the argument is the length of the message in bytes.
     Panic = 6,
-    /// As many codes for the shaker's drive as the argument says: for the scans of the next block.
+    /// Codes for the shaker's drive; the argument is their number. They are for the scans of the
+    /// next block.
     Play = 7,
-    /// The shaker's drive to rest.
+    /// Bring the shaker's drive to rest.
     Rest = 8,
-    /// Both converters' rings start anew with the next scan; the reply's length is that scan's number since the start.
+    /// Restart both converters' rings with the next scan; the reply's length is that scan's number
+    /// since the start.
     Join = 9,
-    /// The external clock times the scans from now on (argument 1) or the board's own (0); the reply's length is 0, 1 when none comes to
-    /// the input, 2 when it is of another rate.
+    /// Select the external clock (argument 1) or the board's own (0) for the scans from now on. The
+    /// reply's length is 0, or 1 when no clock is present at the input, or 2 when it has another
+    /// rate.
     Clock = 10,
-    /// The sync output rises, and falls with the next block; the reply's length is when: in parts of 2¹⁶ of a scan after the newest scan's
-    /// successor.
+    /// Raise the sync output; it falls with the next block. The reply's length is the instant, in
+    /// units of 2⁻¹⁶ of a scan after the scan that follows the newest one.
     Mark = 11,
 }
 
 impl Op {
-    /// The wish that a word means.
+    /// The operation for a word.
     #[must_use]
     pub const fn from_word(word: u32) -> Option<Self> {
         Some(match word {
@@ -132,43 +139,43 @@ impl Op {
 pub const INTERLOCK_CLOSED: u32 = 1;
 /// The emergency stop is pressed.
 pub const EMERGENCY_STOP: u32 = 2;
-/// Somebody turns the reset key; it counts once, with the next block.
+/// The reset key is being turned; valid once, with the next block.
 pub const LOCAL_RESET: u32 = 4;
-/// The clock of the scans waits for the host's acknowledgements.
+/// The scan clock waits for the host's acknowledgements.
 pub const HELD: u32 = 8;
 /// For tests: the acquisition task must panic.
 pub const MUST_PANIC: u32 = 16;
-/// For tests: it must read where no memory is.
+/// For tests: it must read an address without memory.
 pub const MUST_FAULT: u32 = 32;
-/// For tests: it must use up its stack.
+/// For tests: it must overflow its stack.
 pub const MUST_OVERFLOW: u32 = 64;
 
-/// Words of an ask or a reply.
+/// Words in an ask or a reply.
 pub const WORDS: usize = 10;
 
-/// The board's words.
+/// Message of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ask {
     /// An [`Op`].
     pub op: u32,
-    /// Belongs to the wish.
+    /// Argument of the operation.
     pub argument: u32,
     /// The next alarm, µs; [`NEVER`] for none.
     pub alarm_us: u64,
-    /// The instant of the block that is waited for, µs; [`NEVER`] when the converters rest.
+    /// The instant of the awaited block, µs; [`NEVER`] when the converters are stopped.
     pub block_us: u64,
-    /// Bytes taken from the ring for the board.
+    /// Bytes taken from the ring of bytes for the board.
     pub to_device_tail: u32,
-    /// Bytes put into the ring for the host.
+    /// Bytes put into the ring of bytes for the host.
     pub to_host_head: u32,
-    /// Whether a frame waits for room in it.
+    /// Whether a frame waits for space in it.
     pub to_host_full: u32,
     /// Bytes put into the ring of logs.
     pub log_head: u32,
 }
 
 impl Ask {
-    /// No wish, nothing moved, nothing waited for.
+    /// No operation, nothing transferred, nothing awaited.
     pub const NOTHING: Self = Self {
         op: 0,
         argument: 0,
@@ -180,7 +187,7 @@ impl Ask {
         log_head: 0,
     };
 
-    /// As they stand in memory.
+    /// Encodes for the shared memory.
     #[must_use]
     pub const fn to_words(&self) -> [u32; WORDS] {
         [
@@ -197,7 +204,7 @@ impl Ask {
         ]
     }
 
-    /// From memory.
+    /// Decodes from the shared memory.
     #[must_use]
     pub const fn from_words(words: &[u32; WORDS]) -> Self {
         Self {
@@ -213,31 +220,31 @@ impl Ask {
     }
 }
 
-/// The simulator's words.
+/// Message of the simulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reply {
     /// The board's time, µs.
     pub now_us: u64,
-    /// Bits: the inputs, and how the board is run.
+    /// Bits: the inputs, and the run mode of the board.
     pub inputs: u32,
     /// Blocks delivered since the start.
     pub blocks: u32,
-    /// Bytes put into the ring for the board.
+    /// Bytes put into the ring of bytes for the board.
     pub to_device_head: u32,
-    /// Bytes taken from the ring for the host.
+    /// Bytes taken from the ring of bytes for the host.
     pub to_host_tail: u32,
     /// Bytes taken from the ring of logs.
     pub log_tail: u32,
-    /// Bytes of text.
+    /// Length of the text in bytes.
     pub length: u32,
-    /// To [`Op::Play`]: the drive has run dry, and took nothing.
+    /// Reply to [`Op::Play`]: the drive has run dry and accepted nothing.
     pub ran_dry: u32,
-    /// How often the link was cut since the start.
+    /// Number of times the link was cut since the start.
     pub cuts: u32,
 }
 
 impl Reply {
-    /// As they stand in memory.
+    /// Encodes for the shared memory.
     #[must_use]
     pub const fn to_words(&self) -> [u32; WORDS] {
         [
@@ -254,7 +261,7 @@ impl Reply {
         ]
     }
 
-    /// From memory.
+    /// Decodes from the shared memory.
     #[must_use]
     pub const fn from_words(words: &[u32; WORDS]) -> Self {
         Self {
@@ -278,28 +285,31 @@ const fn joined(low: u32, high: u32) -> u64 {
 /// Bytes of a [`Delivery`].
 pub const DELIVERY_BYTES: usize = 32;
 
-/// Counts of the emulated converters' timer in a period: as many parts as the phases of a [`Moment`] need to tell apart.
+/// Timing of the emulated converters' clock: a period has only as many counts as are needed to
+/// distinguish the phases of a [`Moment`].
 pub const CLOCK: Clock = Clock { settled: 1, read_from: 10, read_by: 15 };
 /// Blocks in each of the emulated converters' rings, as on the wired board.
 pub const RING_BLOCKS: u32 = 8;
 
-/// What stands before a block: after it come the words of both converters, the first's and then the second's, little-endian.
+/// Header of a block; the words of both converters follow it, first converter 1, then converter 2,
+/// little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Delivery {
-    /// Scans of which words stand behind it.
+    /// Scans whose words follow.
     pub scans: u32,
-    /// What went wrong, if anything: nothing is there then.
+    /// A fault, if any; no words follow then.
     pub trouble: Option<Trouble>,
-    /// Periods of the clock that have begun since the start.
+    /// Periods of the clock begun since the start.
     pub periods: u32,
-    /// What the board reads off when it has the block, and again until it can tell: the phase of every second look is a quiet one.
+    /// The values that the board reads after receiving the block, repeatedly until it can decide;
+    /// every second reading has a phase outside the read-out.
     pub moment: Moment,
-    /// Something came to the sync port and stands at [`SEEN_AT`].
+    /// Events at the sync port are stored at [`SEEN_AT`].
     pub seen: bool,
 }
 
 impl Delivery {
-    /// As it stands in memory.
+    /// Encodes for the shared memory.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; DELIVERY_BYTES] {
         let trouble = match self.trouble {
@@ -308,7 +318,7 @@ impl Delivery {
             Some(Trouble::Crc) => 2,
             Some(Trouble::Overrun) => 3,
             Some(Trouble::Dma) => 4,
-            // the board finds out by itself
+            // detected by the board itself
             Some(Trouble::Slipped(..)) => 5,
         };
         let [first, second] = self.moment.words;
@@ -322,7 +332,8 @@ impl Delivery {
         bytes
     }
 
-    /// From memory. The emulated converters are silent from the start.
+    /// Decodes from the shared memory. Emulated converters that are silent have been so since the
+    /// start, hence the zero counts.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; DELIVERY_BYTES]) -> Self {
         let word = |place: usize| bytes.as_chunks().0.get(place).map_or(0, |word| u32::from_le_bytes(*word));
@@ -339,7 +350,7 @@ impl Delivery {
     }
 }
 
-/// What came to the sync port, as it stands in memory.
+/// Encodes events at the sync port for the shared memory.
 #[must_use]
 pub fn seen_to_words(seen: &Seen) -> [u32; SEEN_WORDS] {
     let (edge, span) = (seen.edge.unwrap_or_default(), seen.span.unwrap_or_default());
@@ -354,7 +365,7 @@ pub fn seen_to_words(seen: &Seen) -> [u32; SEEN_WORDS] {
     ]
 }
 
-/// From memory.
+/// Decodes events at the sync port.
 #[must_use]
 pub fn seen_from_words([edge, scans, part, lost, span, of, counts]: [u32; SEEN_WORDS]) -> Seen {
     Seen {
@@ -364,27 +375,27 @@ pub fn seen_from_words([edge, scans, part, lost, span, of, counts]: [u32; SEEN_W
     }
 }
 
-/// What an emulated board is told at its start, in postcard.
+/// Start-up data of an emulated board, in postcard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
     /// Serial number.
     pub serial: Name,
     /// Scans per second.
     pub scan_rate_hz: u32,
-    /// Count of starts.
+    /// Number of this start.
     pub boot: u32,
-    /// Blocks that the ring must hold.
+    /// Number of blocks that the ring must hold.
     pub slots: u32,
     /// The channels of a scan.
     pub channels: Vec<Channel, MAX_CHANNELS>,
 }
 
-/// Writes a message into `buffer`; `None` when it does not fit.
+/// Serialises a message into `buffer`; `None` when it does not fit.
 pub fn to_text<'a, T: Serialize>(message: &T, buffer: &'a mut [u8]) -> Option<&'a [u8]> {
     postcard::to_slice(message, buffer).ok().map(|used| &*used)
 }
 
-/// Reads a message; `None` when it is not one.
+/// Deserialises a message; `None` when it is invalid.
 pub fn from_text<'a, T: Deserialize<'a>>(text: &'a [u8]) -> Option<T> {
     postcard::from_bytes(text).ok()
 }

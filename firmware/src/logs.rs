@@ -1,11 +1,12 @@
-//! Log lines on their way to the host: encoded, whole, and the first to be given up.
+//! Log lines for the host: encoded, sent only as whole lines, and the first data to be dropped.
 //!
-//! A board's logger encodes each line (the zero byte that ends it included) and [`Tap::push`]es it. The
-//! transmitter takes lines only when nothing else waits, so that a log never delays a sample; what then finds
-//! no room is dropped whole and counted in [`Counters::logs_dropped`]. The oldest lines stay: what a
-//! board says while it starts reaches the first host that comes.
+//! A board's logger encodes each line (the terminating zero byte included) and passes it to
+//! [`Tap::push`]. The transmitter sends lines only when nothing else waits, so that logging never
+//! delays a sample. Lines without space are dropped as a whole and counted in
+//! [`Counters::logs_dropped`]. The oldest lines are kept, so that messages from the board's start
+//! reach the first host that connects.
 //!
-//! A line never spans two link frames, so that each frame can be read by itself.
+//! A line never spans two link frames, so that each frame can be decoded independently.
 //!
 //! [`Counters::logs_dropped`]: jointrig_protocol::answer::Counters::logs_dropped
 
@@ -17,16 +18,16 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 use heapless::Deque;
 use jointrig_protocol::limits::{CRC_BYTES, MAX_FRAME};
 
-/// The longest line, encoded: what fits one frame of the link.
+/// The longest encoded line: what fits one frame of the link.
 pub const LINE_BYTES: usize = MAX_FRAME - 1 - CRC_BYTES;
 
-/// Bytes that wait for the link: some hundred lines.
+/// Capacity in bytes: about a hundred lines.
 const WAITING_BYTES: usize = 2_048;
 
-/// The end of an encoded line, and nothing but that.
+/// Terminates an encoded line; occurs nowhere else.
 const END: u8 = 0;
 
-/// Lines between a board's logger and its link.
+/// Buffer between a board's logger and its link.
 pub struct Tap<M: RawMutex> {
     waits: AtomicBool,
     lines: Mutex<M, RefCell<Waiting>>,
@@ -44,7 +45,7 @@ impl<M: RawMutex> Default for Tap<M> {
 }
 
 impl<M: RawMutex> Tap<M> {
-    /// Nothing waits.
+    /// An empty buffer.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -53,10 +54,10 @@ impl<M: RawMutex> Tap<M> {
         }
     }
 
-    /// Takes an encoded line, its zero included, or drops all of it: when there is no room for it, when it is
-    /// longer than [`LINE_BYTES`], and when its last byte is not the zero that ends it.
+    /// Adds an encoded line, its zero included. Drops the whole line when there is no space, when
+    /// it is longer than [`LINE_BYTES`], or when its last byte is not the terminating zero.
     ///
-    /// Whoever calls this from an interrupt needs an `M` that allows it.
+    /// To call this from an interrupt, `M` must support it.
     pub fn push(&self, line: &[u8]) {
         self.lines.lock(|waiting| {
             let mut waiting = waiting.borrow_mut();
@@ -65,13 +66,13 @@ impl<M: RawMutex> Tap<M> {
                 waiting.dropped = waiting.dropped.saturating_add(1);
                 return;
             }
-            // there is room: that was looked at
+            // space was checked above
             waiting.bytes.extend(line.iter().copied());
             self.waits.store(true, Ordering::Relaxed);
         });
     }
 
-    /// Whether a line waits: asked after every frame, and cheaper than looking.
+    /// Whether a line waits: queried after every frame, and cheaper than taking the lock.
     #[must_use]
     pub fn waits(&self) -> bool {
         self.waits.load(Ordering::Relaxed)
@@ -83,7 +84,8 @@ impl<M: RawMutex> Tap<M> {
         self.lines.lock(|waiting| waiting.borrow().dropped)
     }
 
-    /// Moves as many whole lines as fit into `room`; how many bytes they are, or `None` when nothing waits.
+    /// Moves as many whole lines as fit into `room`. Returns their length in bytes, or `None` when
+    /// no whole line was moved.
     #[must_use]
     pub fn take(&self, room: &mut [u8]) -> Option<usize> {
         self.lines.lock(|waiting| {

@@ -1,26 +1,28 @@
-//! The memory of answers that makes requests idempotent.
+//! Storage of replies that makes requests idempotent.
 //!
-//! A host repeats a request, with its number, until it hears an answer. A number that was carried out is
-//! answered from here and does nothing twice; a number too old to be told from a repeat is refused.
+//! A host repeats a request with the same number until it receives a reply. A request that was
+//! already carried out is answered from here without acting again; a number too old to be
+//! recognised as a repeat is refused.
 
 use heapless::Deque;
 use jointrig_protocol::answer::Numbered;
 
-/// Answers remembered. A host has one request in the air at a time; eight cover any reordering of repeats.
+/// Number of stored replies. A host has one outstanding request at a time; eight cover any
+/// reordering of repeats.
 pub const REMEMBERED: usize = 8;
 
-/// What to do with a request of some number.
+/// How to treat a request with a given number.
 #[derive(Debug, PartialEq)]
 pub enum Seen {
-    /// Never carried out: do it.
+    /// Not carried out yet: do it.
     New,
-    /// Carried out: say this again.
+    /// Already carried out: send this reply again.
     Before(Numbered),
-    /// Too old to know.
+    /// Too old to decide.
     Stale,
 }
 
-/// The last answers of one session.
+/// The last replies of one session.
 #[derive(Default)]
 pub struct Memory {
     answers: Deque<Numbered, REMEMBERED>,
@@ -32,22 +34,22 @@ impl Memory {
         Self { answers: Deque::new() }
     }
 
-    /// What is known of this number.
+    /// Looks up a number.
     pub fn look_up(&self, number: u32) -> Seen {
         if let Some(answer) = self.answers.iter().find(|answer| answer.number == number) {
             return Seen::Before(answer.clone());
         }
-        // with the memory full, a number before all that it holds may have been carried out and forgotten
+        // when full, a number lower than all stored ones may have been carried out and removed
         let forgotten = self.answers.is_full() && self.answers.iter().all(|answer| number < answer.number);
         if forgotten { Seen::Stale } else { Seen::New }
     }
 
-    /// Remembers an answer; the oldest is forgotten.
+    /// Stores a reply; removes the oldest when full.
     pub fn keep(&mut self, answer: &Numbered) {
         if self.answers.is_full() {
             self.answers.pop_front();
         }
-        // there is room: one was just forgotten if there was none
+        // there is space: the oldest was removed if necessary
         let _ = self.answers.push_back(answer.clone());
     }
 }

@@ -1,10 +1,11 @@
-//! What a Cortex-M33 says of a fault: its status registers in words (Armv8-M Architecture Reference Manual, DDI 0553, "CFSR").
+//! Fault status of a Cortex-M33 in words, from its status registers (Armv8-M Architecture Reference
+//! Manual, DDI 0553, "CFSR").
 
 use core::fmt;
 
 use crate::sentence::{Sentence, Tell};
 
-/// The status registers as they were when the fault handler began.
+/// The status registers at entry of the fault handler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
     /// Configurable Fault Status Register, 0xE000ED28.
@@ -15,7 +16,7 @@ pub struct Status {
     pub bfar: u32,
 }
 
-/// Bits of CFSR, the more telling first.
+/// Bits of CFSR, the more specific first.
 const WORDS: [(u32, &str); 16] = [
     (20, "stack overflow"),
     (25, "division by zero"),

@@ -1,38 +1,38 @@
-//! The force pulse, followed on the fly: trigger, peak, width, rebounds.
+//! The force pulse, evaluated sample by sample: trigger, peak, width, rebounds.
 //!
-//! A pulse of half a millisecond is only some twenty samples at 51.2 kHz, so that the largest sample
-//! is up to a per cent or two below the peak: the peak is a parabola's through the three largest neighbours.
-//! The host judges a record with better means; what is found here is for the operator's eye and for
-//! stopping a campaign that goes wrong.
+//! A pulse of half a millisecond has only about twenty samples at 51.2 kHz, so the largest sample
+//! is up to one or two per cent below the peak. The peak is therefore taken from a parabola through
+//! the three largest neighbouring samples. The host evaluates a record with better methods; the
+//! values here are for the operator and for stopping a campaign that goes wrong.
 
 use heapless::Vec;
 #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
 use micromath::F32Ext;
 
-/// Longest contact that is followed sample by sample: 2.5 ms at 51.2 kHz.
+/// Longest contact recorded sample by sample: 2.5 ms at 51.2 kHz.
 const CONTACT: usize = 128;
 
-/// The first contact ends when the force falls below this part of its peak.
+/// The first contact ends when the force falls below this fraction of its peak.
 const END_RATIO: f32 = 0.05;
 
-/// Rebounds are looked for from 1 ms after the end of the contact on: the force cell's ringing has
-/// decayed to a thousandth of the peak by then.
+/// Rebounds are detected from 1 ms after the end of the contact on: by then the force cell's
+/// ringing has decayed to a thousandth of the peak.
 const DEAD_S: f32 = 1e-3;
 
-/// What was felt so far.
+/// Results so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Felt {
     /// Peak of the first contact, N.
     pub peak_n: f32,
     /// Time above half of the peak, s.
     pub width_s: f32,
-    /// Largest later force as a part of the peak.
+    /// Largest later force as a fraction of the peak.
     pub rebound_ratio: f32,
-    /// Scans from trigger to it.
+    /// Scans from the trigger to that force.
     pub rebound_after: u32,
 }
 
-/// Follows one pulse from its trigger on.
+/// Evaluates one pulse from its trigger on.
 #[derive(Clone, Debug)]
 pub struct Pulse {
     scan_s: f32,
@@ -45,7 +45,7 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// Ready for a pulse whose scans are `scan_s` seconds apart.
+    /// Prepares for a pulse whose scans are `scan_s` seconds apart.
     pub fn new(scan_s: f32) -> Self {
         Self {
             scan_s,
@@ -58,7 +58,7 @@ impl Pulse {
         }
     }
 
-    /// One sample of the force, N, from the trigger on.
+    /// Adds one sample of the force, N, from the trigger on.
     pub fn feed(&mut self, force_n: f32) {
         if self.over {
             let ratio = force_n / self.felt.peak_n;
@@ -83,7 +83,7 @@ impl Pulse {
         self.felt.width_s = width(&self.contact, self.felt.peak_n / 2.0) * self.scan_s;
     }
 
-    /// What was felt; of a contact that still lasts, the largest sample.
+    /// The results; for a contact that still lasts, the largest sample.
     pub fn felt(&self) -> Felt {
         if self.over { self.felt } else { Felt { peak_n: self.largest, ..self.felt } }
     }
@@ -112,7 +112,7 @@ fn width(samples: &[f32], level: f32) -> f32 {
         (0..samples.len().saturating_sub(1)).rev().find(|i| samples[*i] >= level && samples[i + 1] < level);
     match (rise, fall) {
         (Some(rise), Some(fall)) if fall >= rise => crossing(fall) - crossing(rise),
-        // triggered above half of the peak: count from the first sample
+        // the trigger was above half of the peak: count from the first sample
         (None, Some(fall)) => crossing(fall),
         _ => 0.0,
     }
@@ -122,7 +122,8 @@ fn width(samples: &[f32], level: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// A half sine of `peak` N and `width_s` s, begun `phase` of a sample late, as the trigger sees it.
+    /// A half sine of `peak` N and `width_s` s, starting a fraction `phase` of a sample late, as
+    /// seen from the trigger.
     fn half_sine(peak: f32, width_s: f32, phase: f32, scan_s: f32) -> impl Iterator<Item = f32> {
         (0..400).map(move |i| {
             let t = (i as f32 + phase) * scan_s;
@@ -137,7 +138,7 @@ mod tests {
             let mut pulse = Pulse::new(scan_s);
             half_sine(50.0, 0.41e-3, phase, scan_s).for_each(|f| pulse.feed(f));
             let felt = pulse.felt();
-            // a half sine over 21 samples is a parabola to 1e-4 near its top
+            // a half sine over 21 samples matches a parabola to 1e-4 near its top
             assert!((felt.peak_n - 50.0).abs() < 0.02, "{felt:?}");
             // above half of its peak for two thirds of its length
             assert!((felt.width_s - 0.41e-3 * 2.0 / 3.0).abs() < 3e-6, "{felt:?}");

@@ -1,22 +1,23 @@
-//! Is the structure quiet? Residual motion before a shot, told from white noise.
+//! Checks whether the structure is quiet before a shot: separates residual motion from white noise.
 //!
-//! Free on its wire, substructure A rings at some 27 Hz for tens of seconds, and the tail of one hit
-//! would spoil the FRF of the next. A vibrometer's own noise is white and, over its full band, larger than
-//! a tail that matters. So the velocity is averaged over [`DECIMATE`] scans, the variance of these
-//! averages taken over a window, and the part of it that white noise explains, which the differences of
-//! neighbouring scans tell, subtracted:
+//! Free on its wire, substructure A rings at about 27 Hz for tens of seconds, and the tail of one
+//! hit would spoil the FRF of the next. A vibrometer's own noise is white and, over its full band,
+//! larger than a relevant tail. Therefore the velocity is averaged over [`DECIMATE`] scans, the
+//! variance of these averages is taken over a window, and the contribution of white noise,
+//! estimated from the differences of neighbouring scans, is subtracted:
 //!
 //! ring² = var(averages) − σ²/32,  σ² = mean(difference²)/2
 //!
-//! The estimate of noise variance over n averages scatters by σ²/32·√(2/n); residual motion below three
-//! times that cannot be told from noise and does not delay a shot for ever.
+//! The estimate of the noise variance over n averages scatters by σ²/32·√(2/n). Residual motion
+//! below three times that value cannot be distinguished from noise and does not delay a shot
+//! indefinitely.
 
 use heapless::Vec;
 use jointrig_protocol::limits::MAX_CHANNELS;
 #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
 use micromath::F32Ext;
 
-/// Scans per average: at 51.2 kHz, what lies above some 800 Hz no longer counts as ringing.
+/// Scans per average: at 51.2 kHz, components above about 800 Hz do not count as ringing.
 pub const DECIMATE: u16 = 32;
 
 #[derive(Clone, Copy, Debug)]
@@ -25,14 +26,15 @@ struct Motion {
     limit_codes: f32,
     last: f32,
     sum: f32,
-    /// The first average of the window, subtracted before squaring so that an offset costs no digits.
+    /// The first average of the window, subtracted before squaring so that an offset does not
+    /// reduce precision.
     origin: f32,
     averages: f32,
     squares: f32,
     differences: f32,
 }
 
-/// Judges windows of scans, one after the other, until one is quiet.
+/// Evaluates consecutive windows of scans until one is quiet.
 #[derive(Clone, Debug)]
 pub struct Quiet {
     motions: Vec<Motion, MAX_CHANNELS>,
@@ -44,8 +46,8 @@ pub struct Quiet {
 }
 
 impl Quiet {
-    /// Watches the channels whose limit (in codes, rms) is above zero over windows of `window` averages.
-    /// With no such channel, or no window, everything is quiet.
+    /// Monitors the channels whose limit (in codes, rms) is above zero, over windows of `window`
+    /// averages. Without such a channel or a window, the structure counts as quiet.
     pub fn new(limits_codes: impl Iterator<Item = f32>, window: u16) -> Self {
         let motions = limits_codes
             .take(MAX_CHANNELS)
@@ -65,7 +67,7 @@ impl Quiet {
         Self { motions, window, in_average: 0, averages: 0, started: false, ratio: 0.0 }
     }
 
-    /// Whether there is anything to watch.
+    /// Whether any channel is monitored.
     pub fn watches(&self) -> bool {
         self.window > 1 && !self.motions.is_empty()
     }
@@ -75,7 +77,7 @@ impl Quiet {
         self.ratio
     }
 
-    /// One scan. At the end of each window: whether it was quiet.
+    /// Adds one scan. At the end of each window, returns whether it was quiet.
     pub fn feed(&mut self, code: &impl Fn(usize) -> i16) -> Option<bool> {
         for motion in &mut self.motions {
             let value = f32::from(code(motion.place));
@@ -133,7 +135,7 @@ impl Quiet {
 mod tests {
     use super::*;
 
-    /// Ringing of some amplitude over white noise of some standard deviation, both in codes.
+    /// Ringing of a given amplitude with white noise of a given standard deviation, both in codes.
     fn verdict(amplitude: f32, noise: f32, limit: f32) -> (bool, f32) {
         let mut quiet = Quiet::new([limit].into_iter(), 256);
         let mut state = 12_345_u64;
@@ -142,7 +144,7 @@ mod tests {
             (state >> 40) as f32 / 16_777_216.0 - 0.5
         };
         for i in 0.. {
-            // the sum of twelve uniform numbers has variance one
+            // the sum of twelve uniform random numbers has variance one
             let white: f32 = (0..12).map(|_| uniform()).sum();
             let phase = (core::f64::consts::TAU * 27.3 * f64::from(i) / 51_200.0) as f32;
             let code = (300.0 + amplitude * phase.sin() + noise * white).round() as i16;
@@ -162,7 +164,8 @@ mod tests {
 
     #[test]
     fn ringing_is_seen_under_noise_eight_times_its_size() {
-        // amplitude 3 codes is 2.1 rms, four times the limit; the noise's averages scatter by 5/√32 = 0.9
+        // amplitude 3 codes is 2.1 rms, four times the limit; the noise's averages scatter by 5/√32
+        // = 0.9
         let (calm, ratio) = verdict(3.0, 5.0, 0.5);
         assert!(!calm && ratio > 2.0, "{ratio}");
         assert!(verdict(0.5, 5.0, 0.5).0);

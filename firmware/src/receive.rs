@@ -1,4 +1,4 @@
-//! Receiving: bytes to frames, frames to deeds.
+//! Receiving: finds frames in the incoming bytes and carries out their requests.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::Instant;
@@ -14,7 +14,7 @@ use crate::board::{ByteSource, Stage};
 use crate::fmt::{info, warning};
 use crate::memory::{Memory, Seen};
 
-/// Runs for ever.
+/// Runs forever.
 pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
     core: &Core<'_, M>,
     source: &mut S,
@@ -43,14 +43,14 @@ pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// The link is cut: whoever gave orders cannot take them back any more, and everything that moves comes to rest. For a board that
-    /// notices by other means than the source of its bytes.
+    /// Call when the link is cut: its host can no longer cancel its requests, so everything that
+    /// moves comes to rest. For a board that detects this by means other than its byte source.
     pub fn link_is_cut(&self) {
         self.with(|state| state.bring_to_rest(Reason::LinkLost));
         self.to_send.signal(());
     }
 
-    /// One good frame from the host.
+    /// Processes one valid frame from the host.
     fn hear(&self, frame: &Frame<'_>, stage: &mut impl Stage) {
         self.with(|state| {
             state.counters.frames_in += 1;
@@ -60,15 +60,16 @@ impl<M: RawMutex> Core<'_, M> {
             Kind::Hello => self.greet(frame.payload),
             Kind::Request => self.hear_request(frame.payload, stage),
             Kind::Acknowledge => self.hear_acknowledge(frame.payload),
-            // a device's own kinds, sent by a confused host
+            // kinds that only a device sends, from a faulty host
             Kind::Answer | Kind::Event | Kind::Samples | Kind::Log => {
                 self.with(|state| state.counters.frames_bad += 1);
             }
         }
     }
 
-    /// Answers any Hello of a host, so that even a mismatched one can name both versions; agrees on a
-    /// session only when they match. A new session forgets the old one's requests and stops its doings.
+    /// Replies to any Hello of a host, so that even an incompatible host can report both versions;
+    /// establishes a session only when they match. A new session discards the requests of the old
+    /// one and stops its actions.
     pub(crate) fn greet(&self, payload: &[u8]) {
         let Ok(theirs) = Hello::from_bytes(payload) else {
             self.with(|state| state.counters.frames_bad += 1);
@@ -86,7 +87,7 @@ impl<M: RawMutex> Core<'_, M> {
             state.streaming = false;
             state.answers.clear();
             state.resends.clear();
-            // after the hammer and the shaker have said how they came to rest
+            // only after hammer and shaker have reported how they came to rest
             state.events.begin_session();
             state.ring.forget_losses();
             state.memory = Memory::new();
@@ -109,7 +110,8 @@ impl<M: RawMutex> Core<'_, M> {
         };
         self.with(|state| {
             if state.streaming && acknowledge.epoch == state.epoch {
-                // never beyond what was produced: a damaged host must not make room that is not there
+                // limited to what was produced: a faulty host must not let the front end run
+                // further ahead
                 state.acknowledged = state.acknowledged.max(acknowledge.next_scan.min(state.next_scan));
             }
         });
@@ -118,7 +120,7 @@ impl<M: RawMutex> Core<'_, M> {
 
     fn hear_request(&self, payload: &[u8], stage: &mut impl Stage) {
         if self.with(|state| state.session.is_none()) {
-            // before the handshake nothing is done and nothing is promised
+            // before the handshake, requests are ignored
             return;
         }
         let request = match request::Numbered::read(payload) {
@@ -144,7 +146,7 @@ impl<M: RawMutex> Core<'_, M> {
     }
 
     fn answer(&self, answer: Numbered) {
-        // a full queue drops the answer: the host asks again, and memory has it
+        // a full queue drops the reply: the host asks again, and the reply is stored
         self.with(|state| drop(state.answers.push_back(answer)));
         self.to_send.signal(());
     }

@@ -1,25 +1,28 @@
-//! Whether the relay that gives the coil its 24 V (K1) does what the guard chain tells it.
+//! Monitors whether the relay that supplies the coil's 24 V (K1) follows the guard chain.
 //!
-//! Its forced contacts cannot contradict each other: while a power contact is welded, the contact that is closed at rest stays open
-//! (EN 61810-3). So a board reads that contact back. Each time that the chain opens the relay must be seen to drop, or nothing moves any more; and
-//! after a start it must have been seen to drop once, because nobody knows what happened before.
+//! Its force-guided contacts cannot contradict each other: while a power contact is welded, the
+//! normally closed contact stays open (EN 61810-3). A board therefore reads that contact back. Each
+//! time the chain opens, the relay must be seen to drop, or no further motion is allowed. After a
+//! start it must have been seen to drop once, because its earlier state is unknown.
 
-/// Longest time in which the relay may drop or pull, µs: some 20 ms with diode and Zener across its coil, and as much again for bouncing contacts.
+/// Longest time in which the relay may drop or pull in, µs: about 20 ms with a diode and Zener
+/// diode across its coil, and the same again for bouncing contacts.
 pub const WITHIN_US: u64 = 50_000;
 
-/// What is wrong with the relay.
+/// Fault of the relay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It has not been seen to drop since the start, or since the chain opened for a moment.
+    /// It has not been seen to drop since the start, or since a brief opening of the chain.
     Unproven,
-    /// The chain opened, and it stayed: a contact is welded, or the wire of its return contact is off.
+    /// The chain opened and the relay did not drop: a contact is welded, or the wire of its return
+    /// contact is disconnected.
     Stays,
-    /// The chain closed, and it did not pull.
+    /// The chain closed and the relay did not pull in.
     Rests,
 }
 
 impl Fault {
-    /// What to tell, and what to do.
+    /// The fault, and what the operator must do.
     #[must_use]
     pub fn sentence(self) -> &'static str {
         match self {
@@ -36,13 +39,13 @@ impl Fault {
     }
 }
 
-/// The relay, as its return contact shows it.
+/// State of the relay, as its return contact shows it.
 #[derive(Clone, Copy, Debug)]
 pub struct Relay {
     chain_closed: bool,
-    /// When the chain was last seen to change, µs.
+    /// Time of the last change of the chain, µs.
     since_us: u64,
-    /// Seen to drop since the chain last closed.
+    /// Seen to drop since the chain last opened.
     proven: bool,
     failed: Option<Fault>,
 }
@@ -54,16 +57,17 @@ impl Default for Relay {
 }
 
 impl Relay {
-    /// After a start: nothing is known.
+    /// State after a start: unknown.
     #[must_use]
     pub const fn new() -> Self {
         Self { chain_closed: false, since_us: 0, proven: false, failed: None }
     }
 
-    /// Chain and return contact as they are now; whether something may move.
+    /// Evaluates the present states of chain and return contact, and returns whether motion is
+    /// allowed.
     ///
     /// # Errors
-    /// What is wrong with the relay. A failure stays until the next start.
+    /// The fault of the relay. A failure stays until the next start.
     pub fn see(&mut self, chain_closed: bool, dropped: bool, now_us: u64) -> Result<bool, Fault> {
         if chain_closed != self.chain_closed {
             (self.chain_closed, self.since_us) = (chain_closed, now_us);
@@ -88,7 +92,8 @@ impl Relay {
 mod tests {
     use super::*;
 
-    /// Every ms of these stretches: (until ms, chain closed, dropped); the last verdict.
+    /// Evaluates every ms of these intervals: (until ms, chain closed, dropped); returns the last
+    /// verdict.
     fn after(stretches: &[(u64, bool, bool)]) -> Result<bool, Fault> {
         let mut relay = Relay::new();
         let (mut at, mut last) = (0, Ok(false));
@@ -121,7 +126,8 @@ mod tests {
         assert_eq!(after(&welded), Err(Fault::Stays));
         let closed_again = [&welded[..], &[(2_000, true, false)]].concat();
         assert_eq!(after(&closed_again), Err(Fault::Stays));
-        // the guard opens and closes before the relay could have dropped: nobody knows, and nothing moves
+        // the guard opens and closes before the relay could have dropped: its state is unknown, and
+        // motion is not allowed
         let shortly = [&works[..], &[(1_010, false, false), (1_500, true, false)]].concat();
         assert_eq!(after(&shortly), Err(Fault::Unproven));
     }

@@ -1,4 +1,4 @@
-//! What a board has to report: faults of its parts, and how its last run ended.
+//! Reports of a board: faults of its parts, and how its last run ended.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::event::Event;
@@ -8,7 +8,7 @@ use crate::fmt::warning;
 use crate::sentence::{Sentence, Tell};
 
 impl<M: RawMutex> Core<'_, M> {
-    /// A part of the board reports a fault. The event waits for a host if there is none.
+    /// Reports a fault of a part of the board. Without a host, the event waits for one.
     pub fn report_fault(&self, what: &(impl Tell + ?Sized)) {
         let text = Sentence::of(what);
         warning!("fault: {}", text.as_str());
@@ -16,7 +16,7 @@ impl<M: RawMutex> Core<'_, M> {
         self.to_send.signal(());
     }
 
-    /// The run before this one ended in a panic, which said this.
+    /// Reports that the previous run ended in a panic with this message.
     pub fn report_panic(&self, what: &(impl Tell + ?Sized)) {
         let text = Sentence::of(what);
         warning!("the last run ended in a panic: {}", text.as_str());

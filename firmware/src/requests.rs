@@ -1,4 +1,4 @@
-//! What each request does.
+//! Execution of each request.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::answer::{Answer, Refusal, Status};
@@ -12,7 +12,7 @@ use crate::refusal::out_of_bounds;
 use crate::ring::{CHANNEL_MAP, Range};
 
 impl<M: RawMutex> Core<'_, M> {
-    /// Carries out a request that was not seen before.
+    /// Carries out a request that has not been carried out before.
     pub(crate) fn carry_out(&self, request: &Request, stage: &mut impl Stage) -> Result<Answer, Refusal> {
         match request {
             Request::Info => Ok(Answer::Info(self.info())),
@@ -92,14 +92,15 @@ impl<M: RawMutex> Core<'_, M> {
         })
     }
 
-    /// A new stream is a new epoch; the scan index goes on.
+    /// Starts a new stream with a new epoch; the scan index continues.
     fn start(&self) -> Result<Answer, Refusal> {
         let answer = self.with(|state| {
             if let Some(fault) = state.in_step.now.fault {
                 return Err(Refusal::Clock(fault));
             }
             state.bring_to_rest(Reason::StreamEnded);
-            // each start has room for 65536 streams; after those its epochs run on rather than repeat
+            // each device start has 65536 epochs; after that they run into the next start's range
+            // instead of repeating
             state.epoch = (self.facts.boot << 16).wrapping_add(state.streams);
             state.streams = state.streams.wrapping_add(1);
             state.ring.restart(state.epoch);
@@ -131,7 +132,7 @@ impl<M: RawMutex> Core<'_, M> {
                 return Err(out_of_bounds("no such scans have been produced yet"));
             }
             let range = Range { first_scan, scans: end - first_scan };
-            // a full queue says so by refusing; the host asks again
+            // a full queue is refused; the host asks again
             state.resends.push_back(range).map_err(|_| Refusal::Busy)?;
             Ok(Answer::Resending { first_scan, scans: (end - first_scan) as u32 })
         })

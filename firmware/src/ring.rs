@@ -1,7 +1,7 @@
-//! The ring of recent blocks: the transmit queue and the memory for re-requests are one and the same.
+//! The ring of recent blocks; it is both the transmit queue and the store for retransmission.
 //!
-//! Blocks enter with increasing first scans. A cursor says what has been sent; what leaves the ring
-//! unsent is counted as dropped and kept as a range until it has been reported.
+//! Blocks enter with increasing first scans. A cursor marks what has been sent. Scans that leave
+//! the ring unsent are counted as dropped and kept as a range until it has been reported.
 
 #![expect(clippy::inline_always, reason = "built for size, each would be a call or three for every block")]
 
@@ -10,10 +10,10 @@ use jointrig_protocol::block::{GAP, Header};
 use jointrig_protocol::event::Loss;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
-/// Ranges of lost scans that wait to be reported.
+/// Capacity for ranges of lost scans waiting to be reported.
 const LOSSES: usize = 8;
 
-/// One block in the ring; the samples first, so that they are aligned and copied by words.
+/// One block in the ring; the samples come first, so that they are aligned and copied by words.
 #[derive(Clone, Copy)]
 #[repr(C, align(8))]
 pub struct Slot {
@@ -31,41 +31,42 @@ impl Slot {
 /// A range of scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Range {
-    /// The first.
+    /// The first scan.
     pub first_scan: u64,
-    /// How many.
+    /// Number of scans.
     pub scans: u64,
 }
 
-/// A block taken out to be sent.
+/// A block read from the ring to be sent.
 pub struct Out<'a> {
     /// Its header.
     pub header: Header,
-    /// Its samples, whole scans.
+    /// Its samples, in whole scans.
     pub samples: &'a [u8],
 }
 
-/// The ring over slots that the board gives it.
+/// The ring, over slots provided by the board.
 pub struct Ring<'a> {
     slots: &'a mut [Slot],
     bytes_per_scan: usize,
     epoch: u32,
-    /// Sequence number of the next block to enter; its slot is this modulo the length.
+    /// Sequence number of the next block to enter; its slot index is this modulo the number of
+    /// slots.
     head: u64,
     /// Sequence number of the oldest block held.
     tail: u64,
-    /// Its slot.
+    /// Index of its slot.
     tail_place: usize,
     /// Sequence number of the next block to send.
     cursor: u64,
-    /// Losses that the host does not know of, the oldest first.
+    /// Losses not yet reported to the host, the oldest first.
     unreported: Vec<(Range, Loss), LOSSES>,
     /// Whether the next block to be sent follows a loss.
     gap: bool,
 }
 
 impl<'a> Ring<'a> {
-    /// An empty ring for scans of this many bytes.
+    /// An empty ring for scans of `bytes_per_scan` bytes.
     pub fn new(slots: &'a mut [Slot], bytes_per_scan: usize) -> Self {
         Self {
             slots,
@@ -80,7 +81,7 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Forgets everything and begins a stream.
+    /// Discards everything and begins a stream.
     pub fn restart(&mut self, epoch: u32) {
         self.epoch = epoch;
         (self.tail, self.tail_place) = (self.head, self.place(self.head));
@@ -99,15 +100,16 @@ impl<'a> Ring<'a> {
         (self.tail < self.head).then(|| self.slot(self.tail).first_scan)
     }
 
-    /// Samples of the block that entered last, whole scans.
+    /// Samples of the newest block, in whole scans.
     pub fn newest(&self) -> Option<&[u8]> {
         (self.tail < self.head).then(|| self.out(self.head - 1, 0).samples)
     }
 
-    /// The slot of a block that is held, or of the next one.
+    /// Index of the slot of a block in the ring, or of the next block.
     #[inline(always)]
     fn place(&self, sequence: u64) -> usize {
-        // the difference is below the length, or equal to it: no division, of which there would be two for each block
+        // the difference is at most the length, so this needs no division; there would be two per
+        // block
         let place = self.tail_place + (sequence - self.tail) as usize;
         if place >= self.slots.len() { place - self.slots.len() } else { place }
     }
@@ -117,7 +119,8 @@ impl<'a> Ring<'a> {
         &self.slots[self.place(sequence)]
     }
 
-    /// Puts a block in; the oldest leaves when the ring is full. Returns the scans that left unsent.
+    /// Adds a block, and removes the oldest when the ring is full. Returns the number of scans
+    /// removed unsent.
     pub fn push(&mut self, first_scan: u64, flags: u8, scans: u8, samples: &[u8; BLOCK_SAMPLE_BYTES]) -> u64 {
         let mut dropped = 0;
         if self.head - self.tail == self.slots.len() as u64 {
@@ -140,9 +143,10 @@ impl<'a> Ring<'a> {
         dropped
     }
 
-    /// Notes a loss for the host. Adjoining ranges of one cause become one. When no further range can be
-    /// noted, the newest one is widened over the scans between: every lost scan is reported, and some that
-    /// arrived are reported too, which changes nothing for a host that has them.
+    /// Records a loss to be reported to the host. Adjoining ranges with the same cause are merged.
+    /// When no further range can be recorded, the newest one is extended over the scans in between:
+    /// every lost scan is reported, and so are some that arrived, which has no effect on a host
+    /// that has them.
     #[inline(never)]
     pub fn report(&mut self, range: Range, why: Loss) {
         self.gap = true;
@@ -158,12 +162,12 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Takes the oldest loss that has not been reported yet, and its cause.
+    /// Takes the oldest unreported loss, and its cause.
     pub fn take_loss(&mut self) -> Option<(Range, Loss)> {
         (!self.unreported.is_empty()).then(|| self.unreported.remove(0))
     }
 
-    /// Forgets the losses of a stream whose session has ended.
+    /// Discards the losses of a stream whose session has ended.
     pub fn forget_losses(&mut self) {
         self.unreported.clear();
     }
@@ -173,12 +177,12 @@ impl<'a> Ring<'a> {
         !self.unreported.is_empty()
     }
 
-    /// Blocks that have not been sent.
+    /// Number of unsent blocks.
     pub fn unsent(&self) -> u64 {
         self.head - self.cursor
     }
 
-    /// The next block that has not been sent; the cursor moves on.
+    /// The next unsent block; advances the cursor.
     pub fn next_unsent(&mut self) -> Option<Out<'_>> {
         if self.cursor == self.head {
             return None;
@@ -189,7 +193,7 @@ impl<'a> Ring<'a> {
         Some(self.out(sequence, gap))
     }
 
-    /// The sequence number of the block that holds `scan`, or of the first after it.
+    /// The sequence number of the block that contains `scan`, or of the first after it.
     fn find(&self, scan: u64) -> u64 {
         let (mut low, mut high) = (self.tail, self.head);
         while low < high {
@@ -200,8 +204,8 @@ impl<'a> Ring<'a> {
         low
     }
 
-    /// The block that holds `scan` or the first one after it, with a flag added, and the scan after its
-    /// last. `None` when everything held is older.
+    /// The block that contains `scan` or the first one after it, with a flag added, and the scan
+    /// after its last. `None` when everything in the ring is older.
     pub fn at_or_after(&self, scan: u64, flag: u8) -> Option<(Out<'_>, u64)> {
         let sequence = self.find(scan);
         if sequence == self.head {

@@ -1,18 +1,20 @@
-//! From counts of a board's timers to instants in scans, and whether an external clock is good.
+//! Converts timer counts of a board to instants in scans, and checks an external clock.
 //!
-//! A board has a timer whose period is a scan, a count of those periods, and a third timer that never stops and whose
-//! inputs catch its count at an edge. An edge is thus known in counts of the third; one look at all three, whenever it is taken, says
-//! how many scans ago that was. With an external clock a period is not exactly its nominal count: over a block of scans that is an
-//! error of less than 0.003 of a scan.
+//! A board has a timer whose period is a scan, a counter of those periods, and a third,
+//! free-running timer whose inputs capture its count at an edge. An edge is thus known in counts of
+//! the third timer; one reading of all three, at any later time, yields how many scans ago it was.
+//! With an external clock, a period deviates from its nominal count; over a block of scans this is
+//! an error of less than 0.003 of a scan.
 
 use jointrig_protocol::sync::CLOCK_TOLERANCE_PPM;
 
-/// An instant, as seen from the next scan that will be delivered.
+/// An instant, relative to the next scan that will be delivered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ago {
-    /// By how many scans the last scan at it or before it precedes the next one to be delivered; negative, follows it.
+    /// Number of scans by which the last scan at or before the instant precedes the next one to be
+    /// delivered; negative if it follows it.
     pub scans: i32,
-    /// The part of a scan that had passed since, in parts of 2¹⁶.
+    /// Fraction of a scan that had passed since then, in units of 2⁻¹⁶.
     pub part: u16,
 }
 
@@ -21,13 +23,14 @@ pub struct Ago {
 pub struct Ruler {
     /// Counts of a nominal scan, below 65536.
     pub period: u32,
-    /// Counts from the beginning of a period to the instant at which its scan is taken.
+    /// Counts from the beginning of a period to the sampling instant of its scan.
     pub taken_at: u32,
 }
 
 impl Ruler {
-    /// Where an instant lies that is `since` counts before a look at which the timer was `phase` counts into period `now`, when scan
-    /// `next` (in that count of periods) is the next one to be delivered. `since` is at most 2³⁰: 6 s of 160 MHz.
+    /// The position of an instant that lies `since` counts before a reading at which the timer was
+    /// `phase` counts into period `now`, when scan `next` (in the same count of periods) is the
+    /// next one to be delivered. `since` is at most 2³⁰: 6 s at 160 MHz.
     #[must_use]
     pub fn place(&self, now: u32, phase: u32, since: u32, next: u32) -> Ago {
         let back = since.wrapping_add(self.taken_at).wrapping_sub(phase).cast_signed();
@@ -39,10 +42,10 @@ impl Ruler {
     }
 }
 
-/// How long some scans took.
+/// Duration of a number of scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Span {
-    /// Scans.
+    /// Number of scans.
     pub scans: u32,
     /// Counts of the board's own crystal.
     pub counts: u32,
@@ -50,12 +53,13 @@ pub struct Span {
 
 /// Good spans after which an external clock is trusted: 16 blocks of 0.3 ms are 5 ms.
 const PROOF: u32 = 16;
-/// Scans after which the mean of a clock's rate begins anew: 5 minutes of 51.2 kHz.
+/// Scans after which the mean of a clock's rate is restarted: 5 minutes at 51.2 kHz.
 const MEAN_OVER: u32 = 1 << 24;
-/// Counts by which a span may be off because both its ends are seen in whole counts, behind a synchroniser of one more.
+/// Possible error of a span in counts: both ends are read in whole counts, after a synchroniser of
+/// one more.
 const SLACK: u32 = 4;
 
-/// Watches an external clock.
+/// Monitors an external clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ClockWatch {
     good: u32,
@@ -64,17 +68,17 @@ pub struct ClockWatch {
 }
 
 impl ClockWatch {
-    /// Whether the clock was in its tolerance for long enough to be trusted.
+    /// Whether the clock has been within the tolerance long enough to be trusted.
     #[must_use]
     pub fn trusts(&self) -> bool {
         self.good >= PROOF
     }
 
-    /// Takes one span; whether it is within the tolerance.
+    /// Evaluates one span; returns whether it is within the tolerance.
     pub fn is_good(&mut self, span: Span, period: u32) -> bool {
         let nominal = span.scans.wrapping_mul(period);
         let off = span.counts.wrapping_sub(nominal).cast_signed();
-        // a million is a multiple of the tolerance: no product of more than 32 bits
+        // a million is a multiple of the tolerance, so no product exceeds 32 bits
         if off.unsigned_abs() > nominal / (1_000_000 / CLOCK_TOLERANCE_PPM) + SLACK {
             return false;
         }
@@ -87,7 +91,7 @@ impl ClockWatch {
         true
     }
 
-    /// How much faster than nominal it is, in the mean of the last minutes, ppm.
+    /// How much faster than nominal the clock is, as a mean over the last minutes, ppm.
     #[must_use]
     pub fn ppm(&self, period: u32) -> f32 {
         match self.scans {
@@ -104,12 +108,13 @@ mod tests {
     extern crate std;
     use super::*;
 
-    /// As on the nucleo: 160 MHz, 51.2 kHz, CONVST rises after 1 µs.
+    /// As on the nucleo board: 160 MHz, 51.2 kHz, CONVST rises after 1 µs.
     const RULER: Ruler = Ruler { period: 3125, taken_at: 160 };
 
     #[test]
     fn an_edge_lies_where_it_was_whenever_it_is_looked_at() {
-        // time in counts; scan k is taken at 3125 k + 160; the counts of periods wrap in the midst of it
+        // time in counts; scan k is taken at 3125 k + 160; the count of periods wraps during the
+        // test
         let started = u32::MAX - 3;
         for edge in (0..40_000_u32).step_by(37).chain([159, 160, 161, 3284, 3285, 3286]) {
             let after = edge.wrapping_sub(160).cast_signed();
@@ -140,7 +145,7 @@ mod tests {
             }
             assert!(watch.trusts());
             assert!((f64::from(watch.ppm(3125)) - ppm).abs() < 12.0, "half a count of a block is 11 ppm");
-            // longer than the mean lasts
+            // longer than the averaging period
             for _ in 0..20_000 {
                 assert!(watch.is_good(span(1_500, ppm), 3125), "{ppm}");
             }
@@ -153,9 +158,10 @@ mod tests {
         for (scans, ppm) in [(15, 400.0), (15, -400.0), (1_500, 205.0), (1_500, -205.0), (15, 1e5)] {
             assert!(!ClockWatch::default().is_good(span(scans, ppm), 3125), "{ppm} ppm over {scans}");
         }
-        // two periods of fifteen in which nothing came: the timer goes on by itself, a hundredth slower
+        // two of fifteen periods without an edge: the timer continues by itself, one per cent
+        // slower
         assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 46_875 + 2 * 31 }, 3125));
-        // a disturbance that came as an edge too many
+        // a disturbance counted as an extra edge
         assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 46_875 - 1_500 }, 3125));
         assert!(!ClockWatch::default().is_good(Span { scans: 15, counts: 0 }, 3125));
     }

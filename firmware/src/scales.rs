@@ -1,8 +1,9 @@
-//! The scales by which a session's trigger, quiet, limits and amplitudes are judged.
+//! The scales used in a session for trigger, quiet, limits and amplitudes.
 //!
-//! A board is built with sensitivities; a laboratory knows better ones. A host that does sends them when its session begins, so that
-//! what is held, limited and triggered on is what the host means: two vibrometers calibrated apart would otherwise leave a part of
-//! the motion that they have in common in their difference.
+//! A board is built with nominal sensitivities; a laboratory may have better values. The host sends
+//! these when its session begins, so that control, limits and trigger use the same scales as the
+//! host. Otherwise, two vibrometers calibrated separately would leave a part of their common motion
+//! in their difference.
 
 use heapless::Vec;
 use jointrig_protocol::answer::Refusal;
@@ -11,22 +12,22 @@ use jointrig_protocol::limits::{MAX_CHANNELS, SCALE_FACTOR_CAP};
 
 use crate::refusal::out_of_bounds;
 
-/// SI units per code of every channel, with its sign.
+/// SI units per code of every channel, sign included.
 pub(crate) type UnitsPerCode = Vec<f32, MAX_CHANNELS>;
 
-/// As the board was built.
+/// The built-in scales.
 pub(crate) fn as_built(channels: &[Channel]) -> UnitsPerCode {
     channels.iter().take(MAX_CHANNELS).map(Channel::units_per_code_f32).collect()
 }
 
-/// As a host says, if that can be.
+/// The scales sent by a host, if they are acceptable.
 pub(crate) fn as_told(channels: &[Channel], units_per_volt: &[f32]) -> Result<UnitsPerCode, Refusal> {
     if units_per_volt.len() != channels.len() {
         return Err(out_of_bounds("scales: one for each channel of the device, in its order"));
     }
     let most = SCALE_FACTOR_CAP as f32;
     let fits = |(channel, told): (&Channel, &f32)| {
-        // what is no number, or zero, is in no range
+        // NaN and zero lie in no range
         let factor = (told / channel.units_per_volt).abs();
         factor >= 1.0 / most && factor <= most
     };

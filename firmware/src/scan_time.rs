@@ -1,11 +1,12 @@
-//! From times to scans, without a division of 64 bits: this processor has none, and the code for it costs a kilobyte of flash.
+//! Conversions between times and scans without 64-bit division: this processor has none, and the
+//! code for it takes a kilobyte of flash.
 
-/// Scans in so many ms, rounded down; exact for times up to a day at any rate below 4 MHz.
+/// Number of scans in `ms`, rounded down; exact for times up to a day at any rate below 4 MHz.
 pub(crate) fn scans_in_ms(ms: u32, rate_hz: u32) -> u64 {
     u64::from(ms / 1000) * u64::from(rate_hz) + u64::from(ms % 1000 * rate_hz / 1000)
 }
 
-/// Time of so many scans, ms, good to 1e-6 of it. What is longer than 2³² scans is told as that.
+/// Duration of `scans` in ms, with a relative accuracy of 1e-6. Durations above 2³² scans saturate.
 pub(crate) fn ms_of_scans(scans: u64, rate_hz: u32) -> u32 {
     (u32::try_from(scans).unwrap_or(u32::MAX) as f32 * (1000.0 / rate_hz as f32)) as u32
 }

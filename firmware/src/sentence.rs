@@ -1,17 +1,18 @@
-//! Sentences for people, put together without `core::fmt`, which costs 5 kB of flash as soon as one number is formatted.
+//! Messages for people, composed without `core::fmt`, which takes 5 kB of flash as soon as one
+//! number is formatted.
 
 use core::fmt;
 
 use heapless::String;
 use jointrig_protocol::limits::SENTENCE_BYTES;
 
-/// A sentence as long as an event carries; what does not fit is left out.
+/// A message with the maximum length of an event's text; text that does not fit is dropped.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sentence(String<SENTENCE_BYTES>);
 
-/// What can say of itself what it is.
+/// A value that can describe itself in words.
 pub trait Tell {
-    /// Adds its words.
+    /// Appends its description.
     fn tell(&self, to: &mut Sentence);
 }
 
@@ -22,29 +23,29 @@ impl Tell for str {
 }
 
 impl Sentence {
-    /// Of one who can say it.
+    /// The description of a value.
     pub fn of(what: &(impl Tell + ?Sized)) -> Self {
         let mut sentence = Self::default();
         what.tell(&mut sentence);
         sentence
     }
 
-    /// Adds words, cut at a whole character where the sentence is full.
+    /// Appends text, cut at a character boundary where the message is full.
     pub fn text(&mut self, text: &str) -> &mut Self {
         let room = self.0.capacity() - self.0.len();
-        // at most three bytes back to where a character begins
+        // at most three bytes back to the start of a character
         let fits = (0..=text.len().min(room)).rev().find(|end| text.is_char_boundary(*end));
-        // it fits: its length was just found to
+        // it fits: the length was determined above
         let _ = self.0.push_str(text.get(..fits.unwrap_or(0)).unwrap_or(""));
         self
     }
 
-    /// Adds a number.
+    /// Appends a number.
     pub fn number(&mut self, value: u32) -> &mut Self {
         self.in_base(value, 10, 1)
     }
 
-    /// Adds a number that may be negative.
+    /// Appends a number that may be negative.
     pub fn signed(&mut self, value: i32) -> &mut Self {
         if value < 0 {
             self.text("-");
@@ -52,13 +53,13 @@ impl Sentence {
         self.number(value.unsigned_abs())
     }
 
-    /// Adds `0x` and a number of at least so many digits.
+    /// Appends `0x` and a number with at least `digits` digits.
     pub fn hex(&mut self, value: u32, digits: usize) -> &mut Self {
         self.text("0x").in_base(value, 16, digits)
     }
 
     fn in_base(&mut self, mut value: u32, base: u32, digits: usize) -> &mut Self {
-        // no 32-bit number has more digits than ten
+        // a 32-bit number has at most ten digits
         let mut written = [b'0'; 10];
         let mut first = written.len();
         while value > 0 {
@@ -70,13 +71,13 @@ impl Sentence {
         self.text(core::str::from_utf8(&written[first..]).unwrap_or("?"))
     }
 
-    /// The words.
+    /// The text.
     #[must_use]
     pub fn as_str(&self) -> &str {
         self.0.as_str()
     }
 
-    /// The words, for an event.
+    /// The text, for an event.
     #[must_use]
     pub fn into_string(self) -> String<SENTENCE_BYTES> {
         self.0

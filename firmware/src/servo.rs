@@ -1,21 +1,27 @@
-//! The shaker's amplitude under control: what a lock-in measures is brought to what was ordered, by the drive.
+//! Control of the shaker's amplitude: the drive is adjusted until the amplitude measured by a
+//! lock-in matches the requested one.
 //!
-//! The plant is a structure: its amplitude follows the drive's in proportion, after a delay of some tens of ms
-//! (1 % of damping at 208 Hz settles with 77 ms). So the drive is corrected by ratios: after each measurement by
-//! a part of what is missing, in logarithms, and by a bounded factor. With measurements of 80 ms or more the delay leaves
-//! 0.35 of a change for the next one, and a correction of 0.3 of the error then comes in without swinging: the
-//! roots of (z − 1)(z − 0.35) + 0.3 · 0.65 have the magnitude 0.74 and angles below 23°.
+//! The plant is a structure: its amplitude follows the drive's proportionally, after a delay of
+//! some tens of ms (with 1 % damping at 208 Hz, it settles with a time constant of 77 ms). The
+//! drive is therefore corrected by ratios: after each measurement by a fraction of the missing
+//! logarithmic ratio, and by a factor of at most 1.2. With measurements of 80 ms or more, 0.35 of a
+//! change is left for the next measurement, and a correction of 0.3 of the error then converges
+//! without oscillation: the roots of (z − 1)(z − 0.35) + 0.3 · 0.65 have the magnitude 0.74 and
+//! angles below 23°.
 //!
-//! **A contact that slips** is no such plant. Up to its limit it is stiff; a per cent of drive beyond, it moves several
-//! times as far, and the amplitude's logarithm changes up to some hundred times as fast as the drive's. Nothing tells beforehand at
-//! which drive that is. So the way up is a climb of small steps with a glance of a few cycles after each, the smaller the less is
-//! missing: r times the amplitude is missing, the next step is r/150. Stiff 500 times over, a contact that lets go at that
-//! step moves some three times as far as was ordered, however far it was from there. When less than a fiftieth
-//! is missing, measurements take over.
+//! **A contact that slips** behaves differently. Up to its friction limit it is stiff; with one per
+//! cent more drive it moves several times as far, and the logarithm of the amplitude changes up to
+//! about a hundred times as fast as that of the drive. The drive at which this happens is not known
+//! beforehand. Therefore the amplitude is raised in small steps (the climb), with a glance of a few
+//! cycles after each; the less is missing, the smaller the step: when the target is r times the
+//! amplitude, the next step is r/150 of the drive. If the stiffness falls by a factor of 500 at
+//! that step, the contact moves about three times as far as requested, independently of r. When
+//! less than a fiftieth is missing, measurements take over.
 //!
-//! A glance beyond a ceiling says that the last step went too far: the drive goes back to where it was before, which from then on
-//! is the edge. Up to the edge it is corrected as ever; beyond it by strides that begin at a quarter of the step, and
-//! divided by the steepness that the last two measurements show.
+//! A glance above the ceiling means that the last step was too large: the drive returns to its
+//! previous value, which becomes the edge. Below the edge, a correction may go up to the edge;
+//! beyond it, corrections are bounded, initially to a quarter of that step. All of them are divided
+//! by the steepness found from the last two measurements.
 
 use heapless::Vec;
 use jointrig_protocol::channel::{Channel, Role};
@@ -26,73 +32,79 @@ use micromath::F32Ext;
 use crate::hammer::Scanned;
 use crate::lock_in::LockIn;
 
-/// Shortest measurement.
+/// Shortest measurement, s.
 const LEAST_S: f32 = 0.08;
-/// Part of the logarithmic error that one measurement corrects.
+/// Fraction of the logarithmic error corrected per measurement.
 const PART: f32 = 0.3;
-/// Shortest glance between measurements.
+/// Shortest glance between measurements, s.
 const GLANCE_S: f32 = 0.01;
-/// An amplitude this many times what was ordered is too far, however short it was looked at.
+/// An amplitude above this multiple of the requested one is too large, even in a short glance.
 const CEILING: f32 = 1.25;
-/// Part of the logarithmic error that one measurement corrects where the plant is steep.
+/// Fraction of the logarithmic error corrected per measurement when the plant is steep.
 const STEEP_PART: f32 = 0.35;
-/// The steepest plant that is believed.
+/// Upper bound of the estimated steepness.
 const STEEPEST: f32 = 200.0;
-/// Part of the difference by which a plant that proves less steep is believed to be so.
+/// Fraction of the difference by which the estimate is reduced when the plant proves less steep.
 const FORGETS: f32 = 0.25;
-/// Changes of the drive below this part of it tell nothing of the steepness.
+/// Relative changes of the drive below this value carry no information about the steepness.
 const TELLING: f32 = 2e-4;
-/// The longest logarithmic correction of a steep plant: ln 1.2.
+/// The largest logarithmic correction of a steep plant: ln 1.2.
 const STRIDE: f32 = 0.182;
-/// What a correction that was too long leaves of the next one's bound, and what one that was not makes of it.
+/// Factor on the bound of the next correction after a correction that was too large ([`SHORTER`]),
+/// and after one that was not ([`LONGER`]).
 const SHORTER: f32 = 0.25;
 /// See [`SHORTER`].
 const LONGER: f32 = 1.25;
-/// Largest factor of one correction, and its inverse the smallest.
+/// Largest factor of one correction; its inverse is the smallest.
 const FACTOR: f32 = 1.2;
-/// A step of the climb, for each time that the amplitude is missing.
+/// Relative step of the climb per multiple of the amplitude that is missing.
 const STEP: f32 = 1.0 / 150.0;
-/// The longest step of the climb.
+/// Largest relative step of the climb.
 const LONGEST: f32 = 0.15;
-/// A plant whose amplitude changes this much faster than the drive, in logarithms, has let go.
+/// Steepness above which the contact is considered to slip: the logarithm of the amplitude changes
+/// this many times faster than that of the drive.
 const LETS_GO: f32 = 4.0;
-/// With so many times the amplitude missing a glance may still be noise.
+/// When the target exceeds a glance by this factor or more, the glance may still be noise.
 const NEAR: f32 = 10.0;
-/// The climb is over when no more than this times the amplitude is wanted.
+/// The climb ends when the target is less than this multiple of the amplitude.
 const CLIMBED: f32 = 1.02;
-/// The way up begins at this part of the drive's bound: even in a resonance that is far below a small order.
+/// The climb starts at this fraction of the drive's bound: even in a resonance this is far below a
+/// small request.
 const FIRST_PART: f32 = 0.001;
-/// A glance below this part of the one before says that the amplitude falls.
+/// A glance below this fraction of the previous one means that the amplitude is falling.
 const FALLS: f32 = 0.95;
-/// Glances in a row beyond the ceiling: the amplitude runs away, whatever the drive does.
+/// Consecutive glances above the ceiling after which the amplitude is considered to run away,
+/// independently of the drive.
 const GLANCES: u8 = 12;
-/// Measurements at the drive's bound without reaching the amplitude, until that is told.
+/// Measurements with the drive at its bound and the amplitude not reached, after which this is
+/// reported.
 const PATIENCE: u8 = 25;
 
-/// One signal that is summed: channel and its factor.
+/// One signal of the sum: channel and factor.
 type Term = (u8, f32);
 
 /// Why control cannot go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// The amplitude is far beyond what was ordered.
+    /// The amplitude stays above the ceiling.
     Runaway,
-    /// The drive at its bound does not reach the amplitude.
+    /// The drive at its bound does not reach the requested amplitude.
     Weak,
 }
 
-/// What measures: the channels, and the scale of each.
+/// The measuring channels, and the scale of each.
 pub struct Gauges<'a> {
-    /// Which serves for what.
+    /// The channels, with their roles.
     pub channels: &'a [Channel],
-    /// SI units per code, with its sign, in the same order.
+    /// SI units per code, sign included, in the same order.
     pub units_per_code: &'a [f32],
 }
 
-/// The controller of one order.
+/// The controller for one shaker request.
 pub struct Servo {
     terms: Vec<Term, 2>,
-    /// From the sum's amplitude to the controlled one: 1/ω for a displacement out of velocities.
+    /// Factor from the amplitude of the sum to the controlled one: 1/ω for a displacement from
+    /// velocities.
     gain: f32,
     target: f32,
     most_v: f32,
@@ -101,26 +113,27 @@ pub struct Servo {
     in_vain: u8,
     /// Drive and amplitude of the last measurement.
     last: Option<(f32, f32)>,
-    /// On the way up.
+    /// The climb is in progress.
     climbs: bool,
-    /// What is known since the ceiling was first met.
+    /// Known since the ceiling was first exceeded or the contact was found to slip.
     steep: Option<Steep>,
     beyond: u8,
 }
 
-/// What is known of a steep plant.
+/// Properties of a steep plant.
 #[derive(Clone, Copy)]
 struct Steep {
-    /// Change of the amplitude's logarithm with the drive's.
+    /// Steepness: change of the logarithm of the amplitude per change of that of the drive.
     ness: f32,
-    /// The longest logarithmic correction beyond the edge.
+    /// The largest logarithmic correction beyond the edge.
     stride: f32,
-    /// The drive below which the ceiling was not met, V.
+    /// Drive up to which the ceiling is not exceeded, V.
     edge_v: f32,
 }
 
 impl Servo {
-    /// For the channels of this device; `None` when they do not measure what is to be controlled, or when nothing is.
+    /// A controller for the channels of this device; `None` when they do not measure the quantity
+    /// to be controlled, or when none is to be controlled.
     pub fn new(gauges: &Gauges<'_>, rate_hz: u32, control: Control, step: u32, most_v: f32) -> Option<Self> {
         let find = |role: Role| {
             let place = gauges.channels.iter().position(|channel| channel.role == role)?;
@@ -132,7 +145,7 @@ impl Servo {
             Control::Displacement { amplitude_m } => {
                 let (a, b) = (find(Role::SpecimenA)?, find(Role::SpecimenB)?);
                 let omega = step as f32 / 4_294_967_296.0 * core::f32::consts::TAU * rate_hz as f32;
-                // two places for two terms
+                // capacity for two terms
                 terms.push(a).ok()?;
                 terms.push((b.0, -b.1)).ok()?;
                 (amplitude_m, 1.0 / omega)
@@ -160,17 +173,18 @@ impl Servo {
         })
     }
 
-    /// The amplitude that was measured last, m or N.
+    /// The last measured amplitude, m or N.
     pub fn measured(&self) -> f32 {
         self.measured
     }
 
-    /// The first drive, V.
+    /// The initial drive, V.
     pub fn first_v(&self) -> f32 {
         FIRST_PART * self.most_v
     }
 
-    /// What of an earlier order's control goes on in this one: the measurement under way is dropped.
+    /// Takes over the state of an earlier request's controller; the current measurement is
+    /// discarded.
     pub fn continues(&mut self, before: &Self) {
         self.measured = before.measured;
         self.last = before.last;
@@ -178,7 +192,7 @@ impl Servo {
         self.steep = before.steep;
     }
 
-    /// Takes one scan; the drive that is now wanted, V, when a measurement is complete.
+    /// Processes one scan. Returns the required drive, V, when a measurement is complete.
     ///
     /// # Errors
     /// [`Trouble`], once.
@@ -233,7 +247,8 @@ impl Servo {
         if self.in_vain > PATIENCE { Err(Trouble::Weak) } else { Ok(Some(wanted)) }
     }
 
-    /// What the step from the last measurement to this glance tells, if there was one upwards.
+    /// Steepness from the step between the last measurement and this glance, if the drive was
+    /// increased.
     fn step(&self, glance: f32, drive_v: f32) -> Option<Steep> {
         let (last_v, amplitude) = self.last.filter(|(last_v, _)| drive_v > last_v * (1.0 + TELLING))?;
         let step = logarithm(drive_v / last_v);
@@ -241,7 +256,7 @@ impl Servo {
         Some(Steep { ness, stride: SHORTER * step, edge_v: last_v })
     }
 
-    /// Back from beyond the ceiling: the drive that is wanted.
+    /// Returns from above the ceiling: the required drive.
     fn retreat(&mut self, glance: f32, drive_v: f32) -> Result<f32, Trouble> {
         let falls = self.beyond > 0 && glance < FALLS * self.measured;
         self.climbs = false;
@@ -258,7 +273,7 @@ impl Servo {
         if falls {
             return Ok(drive_v);
         }
-        // even where it was measured last it is too far now
+        // even the drive of the last measurement is too large now
         let Steep { ness, stride, .. } = self.steep.unwrap_or(Steep { ness: 1.0, stride: 0.0, edge_v: 0.0 });
         let back = (logarithm(glance / self.target) / ness).max(stride).min(STRIDE);
         let back_v = drive_v * exponential(-back);
@@ -267,14 +282,15 @@ impl Servo {
         Ok(back_v)
     }
 
-    /// Sees from two measurements how steep the plant is, once it is known to be.
+    /// Updates the steepness from two measurements, once the plant is known to be steep.
     fn learn(&mut self, drive_v: f32) {
         let (Some(steep), Some((last_v, amplitude))) = (&mut self.steep, self.last) else { return };
         let step = logarithm(drive_v / last_v);
         if step.abs() > TELLING {
             let seen =
                 (logarithm(self.measured / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
-            // at the limit itself the plant is stiff one time and steep the next: what is steep is believed at once
+            // at the limit, the plant alternates between stiff and steep: an increase is accepted
+            // immediately
             steep.ness = if seen > steep.ness { seen } else { steep.ness + FORGETS * (seen - steep.ness) };
         }
         if drive_v >= steep.edge_v {
@@ -283,28 +299,29 @@ impl Servo {
     }
 
     fn correction(&self, drive_v: f32) -> f32 {
-        // noise alone may measure nothing at all
+        // with noise alone, the measured amplitude may be zero
         let ratio = self.target / self.measured.max(f32::MIN_POSITIVE);
         let missing = logarithm(ratio);
         let Some(Steep { ness, stride, edge_v }) = self.steep else {
             return exponential(PART * missing).clamp(1.0 / FACTOR, FACTOR);
         };
-        // not by clamp, whose panic for bounds that are no constants can print floats and with that costs 16 kB of flash
+        // not `clamp`: its panic for non-constant bounds can format floats, which takes 16 kB of
+        // flash
         let bound =
             if drive_v < edge_v { logarithm(edge_v / drive_v).max(stride).min(STRIDE) } else { stride };
         exponential((STEEP_PART * missing / ness).max(-stride).min(bound))
     }
 }
 
-/// The logarithm by its series around 1 in (r − 1)/(r + 1): good to 1e-4 from a half to 2, to 5 % from an eighth to 8; beyond those
-/// it is theirs.
+/// Logarithm by its series around 1 in (r − 1)/(r + 1): accurate to 1e-4 between 1/2 and 2, and to
+/// 5 % between 1/8 and 8; saturates beyond.
 fn logarithm(ratio: f32) -> f32 {
     let ratio = ratio.clamp(0.125, 8.0);
     let y = (ratio - 1.0) / (ratio + 1.0);
     2.0 * (y + y * y * y / 3.0 + y.powi(5) / 5.0)
 }
 
-/// The exponential of what is small: to 1e-3 at ± 0.2.
+/// Exponential of a small value: accurate to 1e-3 at ± 0.2.
 fn exponential(step: f32) -> f32 {
     1.0 + step * (1.0 + step / 2.0)
 }

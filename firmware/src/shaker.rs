@@ -6,9 +6,10 @@
 //!    └──── at rest ◀── Stopping ◀──────────────────────────────────────────────────────────────┘
 //! ```
 //!
-//! Like the hammer's, this machine is driven by scans alone. Each delivered block yields the codes of as many scans,
-//! which the acquisition task hands to the drive; a controller that stops giving codes leaves the drive at
-//! rest. The emergency stop is the one thing that does not ramp: it takes the drive away at once.
+//! Like the hammer's, this state machine is driven by scans only. Each delivered block yields as
+//! many codes as it has scans, which the acquisition task passes to the drive; when the controller
+//! stops supplying codes, the drive is at rest. Only the emergency stop does not ramp: it disables
+//! the drive immediately.
 
 use heapless::Vec;
 use jointrig_protocol::answer::{self, Refusal};
@@ -30,33 +31,33 @@ enum State {
     Stopping,
 }
 
-/// A channel that must stay within bounds.
+/// A channel with a limit.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     channel: u8,
     code: u16,
 }
 
-/// The machine.
+/// The shaker's state machine.
 pub struct Shaker<'a> {
     channels: &'a [Channel],
     rate_hz: u32,
     full_scale_v: f32,
     units_per_code: UnitsPerCode,
     state: State,
-    /// The angle of the next scan, in parts of 2³² of a turn.
+    /// The angle of the next scan, in units of 2⁻³² turn.
     angle: u32,
     step: u32,
     amplitude_v: f32,
     ordered_v: f32,
-    /// Change of the amplitude from one scan to the next, V.
+    /// Change of the amplitude per scan, V.
     slew_v: f32,
     bounds: Vec<Bound, MAX_CHANNELS>,
     servo: Option<Servo>,
 }
 
 impl<'a> Shaker<'a> {
-    /// At rest. A `full_scale_v` of 0 is a board without a shaker.
+    /// A shaker at rest. A `full_scale_v` of 0 means a board without a shaker.
     pub fn new(channels: &'a [Channel], rate_hz: u32, full_scale_v: f32) -> Self {
         Self {
             channels,
@@ -74,12 +75,12 @@ impl<'a> Shaker<'a> {
         }
     }
 
-    /// Judges by these scales from the next order on.
+    /// Uses these scales from the next request on.
     pub(crate) fn judge_by(&mut self, scales: &UnitsPerCode) {
         self.units_per_code.clone_from(scales);
     }
 
-    /// What it does, in the protocol's words.
+    /// Its state, in the protocol's terms.
     pub fn state(&self) -> answer::Shaker {
         match self.state {
             State::Resting => answer::Shaker::Resting,
@@ -89,31 +90,33 @@ impl<'a> Shaker<'a> {
         }
     }
 
-    /// Amplitude of the drive now, V.
+    /// Present amplitude of the drive, V.
     pub fn amplitude_v(&self) -> f32 {
         self.amplitude_v
     }
 
-    /// Amplitude that was last measured of what is controlled, m or N; 0 when the drive itself is.
+    /// Last measured amplitude of the controlled quantity, m or N; 0 when the drive itself is
+    /// controlled.
     pub fn controlled(&self) -> f32 {
         self.servo.as_ref().map_or(0.0, Servo::measured)
     }
 
-    /// Whether the drive wants codes.
+    /// Whether the drive needs codes.
     pub fn moves(&self) -> bool {
         self.state != State::Resting
     }
 
-    /// Fastest change of the amplitude, V/s.
+    /// Largest slew rate of the amplitude, V/s.
     fn fastest_v_per_s(&self) -> f32 {
         self.full_scale_v * 1000.0 / SHAKE_RAMP_MS as f32
     }
 
-    /// Accepts an order; from rest, the sine begins at its zero. An order that is refused changes nothing.
+    /// Accepts a request; from rest, the sine begins at its zero crossing. A refused request
+    /// changes nothing.
     ///
     /// # Errors
-    /// [`Refusal::Unsupported`] without a shaker, or without the channels that measure what is to be controlled;
-    /// [`Refusal::OutOfBounds`] says which bound.
+    /// [`Refusal::Unsupported`] without a shaker, or without the channels that measure the quantity
+    /// to be controlled; [`Refusal::OutOfBounds`] states which bound is violated.
     pub fn shake(&mut self, now: u64, order: &Shake) -> Result<Option<Event>, Refusal> {
         if self.full_scale_v <= 0.0 {
             return Err(Refusal::Unsupported);
@@ -122,7 +125,7 @@ impl<'a> Shaker<'a> {
         if order.step == 0 || order.step > u32::MAX / SHAKE_SCANS_PER_CYCLE {
             return refuse("the shaker's frequency must be above 0 and at most a tenth of the scan rate");
         }
-        // written so that what is not a number is refused, too
+        // written so that NaN is refused, too
         if !(order.amplitude_v >= 0.0 && order.amplitude_v <= self.full_scale_v) {
             return refuse("the shaker's amplitude must be 0 to the full scale of its drive");
         }
@@ -159,8 +162,8 @@ impl<'a> Shaker<'a> {
         self.step = order.step;
         self.ordered_v = match (&mut servo, &self.servo) {
             (None, _) => order.amplitude_v,
-            // an order renewed or changed goes on from the drive that it finds; not by clamp, whose panic can print
-            // floats and with that costs 16 kB of flash
+            // a renewed or changed request continues from the present drive; not `clamp`, whose
+            // panic can format floats, which takes 16 kB of flash
             (Some(servo), Some(before)) if !was_resting => {
                 servo.continues(before);
                 self.ordered_v.max(servo.first_v()).min(order.amplitude_v)
@@ -181,7 +184,7 @@ impl<'a> Shaker<'a> {
         bounds.map(|(channel, code)| Bound { channel: channel as u8, code: code as u16 }).collect()
     }
 
-    /// Begins to come to rest, if it runs.
+    /// Starts the ramp to rest, if the shaker is running.
     pub fn stop(&mut self, reason: Reason) -> Option<Event> {
         if !matches!(self.state, State::Running { .. }) {
             return None;
@@ -192,11 +195,11 @@ impl<'a> Shaker<'a> {
         Some(Event::ShakerStops(reason))
     }
 
-    /// Is at rest at once: the drive was taken away. Nothing ramps.
+    /// Sets the state to rest immediately, because the drive was disabled. There is no ramp.
     pub fn halt(&mut self, reason: Reason) -> Option<Event> {
         let told = match self.state {
             State::Running { .. } => Some(Event::ShakerStops(reason)),
-            // why it stops was told when it began to
+            // the reason was reported when the stop began
             State::Stopping => Some(Event::ShakerRests),
             State::Resting => None,
         };
@@ -205,7 +208,8 @@ impl<'a> Shaker<'a> {
         told
     }
 
-    /// Judges one block, and writes the codes of as many scans. Events tell what changed.
+    /// Evaluates one block and writes as many codes as it has scans. Returns events for what
+    /// changed.
     pub fn block(&mut self, block: &impl Scanned, codes: &mut [i16]) -> [Option<Event>; 2] {
         let end = block.first_scan() + block.scans() as u64;
         let mut stops = None;
@@ -221,7 +225,8 @@ impl<'a> Shaker<'a> {
             if stops.is_none() {
                 stops = self.correct(block, scan);
             }
-            // the amplitude is at most full scale, so that the product is a code; it is rounded to the nearest
+            // the amplitude is at most full scale, so the product is a valid code; it is rounded to
+            // the nearest
             let exact = self.amplitude_v * code_per_v * sine(self.angle);
             *code = (exact + 0.5_f32.copysign(exact)) as i16;
             self.angle = self.angle.wrapping_add(self.step);
@@ -238,7 +243,8 @@ impl<'a> Shaker<'a> {
         [stops, rests.then_some(Event::ShakerRests)]
     }
 
-    /// Lets the controller see a scan, and follows it. What it measures need not be in phase with what is driven.
+    /// Passes one scan to the amplitude controller and applies its result. The measured quantity
+    /// need not be in phase with the drive.
     fn correct(&mut self, block: &impl Scanned, scan: usize) -> Option<Event> {
         let State::Running { .. } = self.state else { return None };
         let servo = self.servo.as_mut()?;

@@ -1,4 +1,4 @@
-//! The shaker's machine, block by block.
+//! Tests of the shaker's state machine, block by block.
 
 extern crate std;
 use jointrig_protocol::channel::{Axis, Name, Quantity, Role};
@@ -9,7 +9,7 @@ use super::*;
 const RATE: u32 = 51_200;
 const FULL_V: f32 = 10.0;
 
-/// A block whose only channel shows one code.
+/// A block with one channel and a constant code.
 struct Block {
     first: u64,
     scans: usize,
@@ -54,7 +54,7 @@ fn order(frequency_hz: f64, amplitude_v: f32) -> Shake {
     }
 }
 
-/// Lets so many blocks of 24 scans pass; the codes, and what was told.
+/// Processes `blocks` blocks of 24 scans; returns the codes and the events.
 fn run(shaker: &mut Shaker, now: &mut u64, blocks: u32, code: i16) -> (List<i16>, List<Event>) {
     let (mut all, mut told) = (List::new(), List::new());
     for _ in 0..blocks {
@@ -87,9 +87,9 @@ fn the_sine_has_the_frequency_and_amplitude_that_were_ordered() {
         square += value * value / whole as f64;
     }
     let amplitude = re.hypot(im);
-    // a code of rounding scatters over the sum and vanishes in it
+    // rounding of a code averages out over the sum
     assert!((amplitude - 0.5 * 32767.0).abs() < 0.1, "{amplitude}");
-    // all that is not the sine: rounding to codes is 0.29 rms
+    // everything but the sine: rounding to codes is 0.29 rms
     let rest = (square - amplitude * amplitude / 2.0).max(0.0).sqrt();
     assert!(rest < 0.4, "{rest}");
 }
@@ -98,7 +98,7 @@ fn the_sine_has_the_frequency_and_amplitude_that_were_ordered() {
 fn the_amplitude_never_jumps_whatever_is_ordered() {
     let (mut shaker, mut now) = (shaker(FULL_V), 0);
     let mut all = List::new();
-    // the fastest slew, and a frequency so low that the codes show the amplitude's own change
+    // the fastest slew, and frequencies so low that the codes show the amplitude's own change
     let fast = |frequency, amplitude| Shake { slew_v_per_s: 200.0, ..order(frequency, amplitude) };
     for (frequency, amplitude) in [(100.0, 10.0), (130.0, 0.1), (90.0, 10.0), (90.0, 0.0)] {
         shaker.shake(now, &fast(frequency, amplitude)).expect("an order within bounds");
@@ -127,7 +127,7 @@ fn an_order_expires_into_a_ramp() {
     let (_, told) = run(&mut shaker, &mut now, 200, 0);
     assert_eq!(told, [Event::ShakerStops(Reason::Expired), Event::ShakerRests]);
     assert_eq!((shaker.state(), shaker.amplitude_v()), (answer::Shaker::Resting, 0.0));
-    // renewed in time, it goes on
+    // renewed in time, it continues
     shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
     for _ in 0..5 {
         assert!(run(&mut shaker, &mut now, 1500, 0).1.is_empty());
@@ -183,12 +183,12 @@ fn an_emergency_leaves_nothing_to_ramp() {
     assert_eq!(shaker.halt(Reason::EmergencyStop), Some(Event::ShakerStops(Reason::EmergencyStop)));
     assert!(!shaker.moves());
     assert_eq!(shaker.halt(Reason::EmergencyStop), None);
-    // on its way down already, it only has to say that it rests
+    // when already stopping, it only reports that it is at rest
     shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
     run(&mut shaker, &mut now, 20, 0);
     assert_eq!(shaker.stop(Reason::FrontEnd), Some(Event::ShakerStops(Reason::FrontEnd)));
     assert_eq!(shaker.halt(Reason::RanDry), Some(Event::ShakerRests));
-    // and the next order begins from nothing
+    // the next request starts from zero amplitude
     shaker.shake(now, &order(200.0, 5.0)).expect("an order within bounds");
     let (codes, _) = run(&mut shaker, &mut now, 1, 0);
     // 24 scans at 100 V/s are 0.047 V

@@ -1,13 +1,14 @@
-//! A sine from an angle in parts of a turn, for the drive.
+//! Sine of an angle in fractions of a turn, for the drive.
 //!
-//! micromath's is good to a thousandth, which would be harmonics at −60 dB in the drive; libm's computes in
-//! double precision, which a Cortex-M33 does in software. A polynomial over a quarter turn has neither fault.
+//! micromath's sine is accurate to a thousandth, which would cause harmonics at −60 dB in the
+//! drive; libm's uses double precision, which a Cortex-M33 computes in software. A polynomial over
+//! a quarter turn avoids both drawbacks.
 
-/// Taylor's coefficients of sin(π/2 · x) in odd powers of x. The first one left out bounds the error by
-/// (π/2)¹¹/11! = 3.6e-6: a ninth of a code of 16 bits.
+/// Taylor coefficients of sin(π/2 · x) in odd powers of x. The first omitted term bounds the error
+/// by (π/2)¹¹/11! = 3.6e-6: a ninth of a 16-bit code.
 const COEFFICIENTS: [f32; 5] = [1.570_796_4, -0.645_964_1, 0.079_692_63, -0.004_681_754, 0.000_160_441_2];
 
-/// sin of `angle`, which is in parts of 2³² of a turn. Error below 4e-6.
+/// sin of `angle`, in units of 2⁻³² turn. Error below 4e-6.
 pub fn sine(angle: u32) -> f32 {
     // −1 to 1 over the half turn around zero; the other half turn is its mirror image
     let quarters = angle.cast_signed();

@@ -1,35 +1,40 @@
-//! From a slow converter's voltages to temperature and bias, as docs/WIRING.md draws the circuits.
+//! Converts the voltages of a slow converter to temperature and bias, for the circuits in
+//! docs/WIRING.md.
 
 #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
 use micromath::F32Ext;
 
 /// The resistor from the reference to the Pt1000, Ω.
 const SERIES_OHM: f32 = 2_200.0;
-/// Platinum, IEC 60751: R = R₀ (1 + A t + B t²) above 0 °C, and 0.1 K off at −40 °C, where a third term begins.
+/// Platinum, IEC 60751: R = R₀ (1 + A t + B t²) above 0 °C; off by 0.1 K at −40 °C, because a third
+/// term applies below 0 °C.
 const R0_OHM: f32 = 1_000.0;
 /// See [`R0_OHM`], 1/K.
 const A: f32 = 3.9083e-3;
 /// See [`R0_OHM`], 1/K².
 const B: f32 = -5.775e-7;
-/// Temperatures that a specimen in a laboratory can have; beyond them the sensor is off or shorted.
+/// Plausible temperatures of a specimen in a laboratory; beyond them the sensor is disconnected or
+/// shorted.
 const BELIEVED_C: core::ops::Range<f32> = -50.0..150.0;
 
-/// Temperature of a Pt1000 to ground, behind its series resistor from the converter's own reference: `part` is the voltage at the sensor over
-/// the reference. °C; none where no sensor can be.
+/// Temperature of a Pt1000 to ground with a series resistor from the converter's own reference, °C.
+/// `part` is the voltage at the sensor divided by the reference. `None` for values without a
+/// plausible sensor.
 #[must_use]
 pub fn pt1000_c(part: f32) -> Option<f32> {
     if !(part > 0.0 && part < 1.0) {
         return None;
     }
     let ohm = SERIES_OHM * part / (1.0 - part);
-    // t = (−A + √(A² − 4 B (1 − R/R₀))) / 2 B, written so that no digits cancel
+    // t = (−A + √(A² − 4 B (1 − R/R₀))) / 2 B, rearranged to avoid cancellation
     let constant = 1.0 - ohm / R0_OHM;
     let square = A * A - 4.0 * B * constant;
     let temperature_c = -2.0 * constant / (A + root(square)?);
     BELIEVED_C.contains(&temperature_c).then_some(temperature_c)
 }
 
-/// micromath's root is good to some per cent; two steps of Newton's make 1e-6 of it.
+/// micromath's square root is accurate to a few per cent; two Newton steps reduce the error to
+/// 1e-6.
 fn root(square: f32) -> Option<f32> {
     if square.is_nan() || square <= 0.0 {
         return None;
@@ -45,7 +50,7 @@ fn root(square: f32) -> Option<f32> {
 mod tests {
     use super::*;
 
-    /// The part of the reference at a resistance, Ω.
+    /// Voltage ratio to the reference at a resistance, Ω.
     fn part(ohm: f32) -> f32 {
         ohm / (ohm + SERIES_OHM)
     }

@@ -1,4 +1,5 @@
-//! What the tasks share: one [`Core`], behind one mutex, plus the two signals that wake the others.
+//! The state shared by the tasks: one [`Core`] behind one mutex, and two signals that wake other
+//! tasks.
 
 use core::cell::RefCell;
 
@@ -25,12 +26,12 @@ use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
 use crate::shaker::Shaker;
 
-/// Answers that wait for the link.
+/// Capacity for replies waiting for the link.
 const ANSWERS: usize = 8;
-/// Ranges that wait to be sent again.
+/// Capacity for ranges waiting to be retransmitted.
 const RESENDS: usize = 8;
 
-/// What does not change while the device runs.
+/// Properties that do not change while the device runs.
 #[derive(Clone, Debug)]
 pub struct Facts<'a> {
     /// Name of the board.
@@ -53,10 +54,10 @@ pub struct Facts<'a> {
     pub drive_v: f32,
     /// Whether the board has sync input, sync output and clock input.
     pub sync: bool,
-    /// Why the device started.
+    /// Cause of the last reset.
     pub reset: Reset,
-    /// Tells this start from all others: one more than the last start's, or a number that none had. Its low 16 bits
-    /// are the upper ones of the first stream's epoch.
+    /// Distinguishes this start from all others: one more than the last start's number, or a number
+    /// never used before. Its low 16 bits are the high 16 bits of the first stream's epoch.
     pub boot: u32,
 }
 
@@ -82,7 +83,7 @@ pub(crate) struct State<'a> {
     /// The session agreed on, if any.
     pub session: Option<u32>,
     pub hello_due: Option<u32>,
-    /// The host reads packets, and is sent them.
+    /// The host reads packets, so packets are sent.
     pub packets: bool,
     pub answers: Deque<answer::Numbered, ANSWERS>,
     pub events: Events,
@@ -95,21 +96,21 @@ pub(crate) struct State<'a> {
     pub next_scan: u64,
     pub acknowledged: u64,
     pub last_heard: Instant,
-    /// When the front end last delivered.
+    /// Time of the last delivery of the front end.
     pub last_block: Instant,
     pub interlock_closed: bool,
     pub emergency_stop: bool,
-    /// An order for the coil that arose outside the acquisition task.
+    /// An order for the coil from outside the acquisition task.
     pub coil: Option<CoilOrder>,
-    /// The drive must rest at once.
+    /// The drive must go to rest immediately.
     pub drive_off: bool,
-    /// Temperature and sensor supplies as they were measured last.
+    /// Last measured temperature and sensor supplies.
     pub slow: Slow,
-    /// The channel of the excitation's force.
+    /// Index of the excitation force channel.
     pub excitation: Option<usize>,
-    /// The session has brought scales of its own.
+    /// The session has sent its own scales.
     pub scales_told: bool,
-    /// Clock of the scans, sync input and output.
+    /// Scan clock, sync input and output.
     pub in_step: InStep,
 }
 
@@ -119,7 +120,8 @@ impl<'a, M: RawMutex> Core<'a, M> {
     /// `slots` is the memory of the ring: at least a second of all channels.
     ///
     /// # Panics
-    /// When there are no channels, more than 16, or no slots: a board's mistake that no run can mend.
+    /// When there are no channels, more than 16, or no slots: a programming error of the board that
+    /// cannot be handled at run time.
     pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
         assert!(limits::scans_per_block(facts.channels.len()).is_some(), "a scan has 1 to 16 channels");
         assert!(!slots.is_empty(), "the ring needs memory");
@@ -145,7 +147,8 @@ impl<'a, M: RawMutex> Core<'a, M> {
             acknowledged: 0,
             last_heard: Instant::from_ticks(0),
             last_block: Instant::from_ticks(0),
-            // closed and released until the board says otherwise, which it does with the first block
+            // closed and released until the board reports otherwise, at the latest with the first
+            // block
             interlock_closed: true,
             emergency_stop: false,
             coil: None,
@@ -164,7 +167,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
         }
     }
 
-    /// The same with log lines for the host, which a board's logger puts into `tap`.
+    /// Adds log lines for the host, which a board's logger puts into `tap`.
     #[must_use]
     pub fn with_logs(mut self, tap: &'a Tap<M>) -> Self {
         self.logs = Some(tap);
@@ -175,35 +178,37 @@ impl<'a, M: RawMutex> Core<'a, M> {
         self.state.lock(|state| f(&mut state.borrow_mut()))
     }
 
-    /// Guard and emergency stop as they are now, told by a board whose inputs interrupt; from any task, whatever
-    /// acquisition does. The host hears of a change even when no blocks come.
+    /// Takes the present states of guard and emergency stop, from a board whose inputs trigger
+    /// interrupts; callable from any task, whatever acquisition is doing. The host is informed of a
+    /// change even when no blocks arrive.
     ///
-    /// Returns whether the caller must take the coil's current away at once. Acquisition gets the same
-    /// order, so that one of the two carries it out when the other is stuck.
+    /// Returns whether the caller must cut the coil's current immediately. Acquisition gets the
+    /// same order, so that it is carried out even if one of the two is stuck.
     #[must_use]
     pub fn see_inputs(&self, interlock_closed: bool, emergency_stop: bool) -> bool {
         let danger = !interlock_closed || emergency_stop;
         self.with(|state| {
             state.heed(interlock_closed, emergency_stop);
             if danger {
-                // whatever state the machine believes in
+                // independently of the state machine's state
                 state.coil = Some(CoilOrder::Off);
             }
-            // also when the stop is latched already: who muted the drive waits for this order
+            // also when the stop is already latched: the code that muted the drive waits for this
+            // order
             state.drive_off |= emergency_stop;
         });
         self.to_send.signal(());
         danger
     }
 
-    /// Scans that can be sent again.
+    /// Scans that can be retransmitted.
     pub fn ring_scans(&self) -> u32 {
         self.with(|state| state.ring.capacity_scans())
     }
 
     pub(crate) fn info(&self) -> Info {
         let mut version = Name::new();
-        // a version of more than 24 characters would be cut here, and nowhere else
+        // only a version of more than 24 characters would be cut here
         let _ = version.push_str(env!("CARGO_PKG_VERSION"));
         Info {
             board: self.facts.board.clone(),
@@ -223,12 +228,12 @@ impl<'a, M: RawMutex> Core<'a, M> {
 }
 
 impl State<'_> {
-    /// Queues an event; what a full queue drops is counted.
+    /// Queues an event and counts those that a full queue drops.
     pub fn say(&mut self, event: Event) {
         self.counters.events_dropped += self.events.push(self.next_scan, event);
     }
 
-    /// Says what came of a step of the hammer, and keeps its order for the coil.
+    /// Reports the result of a step of the hammer, and stores its order for the coil.
     #[inline]
     pub fn tell(&mut self, outcome: &Outcome) {
         if outcome.coil.is_some() {
@@ -256,27 +261,27 @@ impl State<'_> {
         }
     }
 
-    /// Disarms, for a reason.
+    /// Disarms the hammer.
     pub fn disarm(&mut self, reason: Reason) {
         let outcome = self.hammer.disarm(reason);
         self.tell(&outcome);
     }
 
-    /// Brings everything that moves to rest, for a reason: the hammer is disarmed, the shaker ramps down.
+    /// Brings everything that moves to rest: the hammer is disarmed, the shaker ramps down.
     pub fn bring_to_rest(&mut self, reason: Reason) {
         self.disarm(reason);
         let stops = self.shaker.stop(reason);
         self.tell_of_shaker(stops);
     }
 
-    /// Queues what the shaker has to tell, if anything.
+    /// Queues events of the shaker.
     pub fn tell_of_shaker(&mut self, events: impl IntoIterator<Item = Event>) {
         for event in events {
             self.say(event);
         }
     }
 
-    /// Whether the hammer may be armed, or fired.
+    /// Whether the hammer may be armed or fired.
     pub fn may_strike(&self) -> Result<(), Refusal> {
         self.may_move()?;
         if self.shaker.moves() { Err(Refusal::ShakerRuns) } else { self.is_fed(self.hammer.force_channel()) }
@@ -291,7 +296,8 @@ impl State<'_> {
         }
     }
 
-    /// Whether anything may move at all: the one gate before arming, before a shot and before the shaker.
+    /// Whether any motion is allowed: the common check before arming, before a shot and before the
+    /// shaker.
     pub fn may_move(&self) -> Result<(), Refusal> {
         if !self.streaming {
             return Err(Refusal::NotStreaming);
@@ -305,8 +311,8 @@ impl State<'_> {
         Ok(())
     }
 
-    /// Heeds guard and emergency stop as they are now. Releasing the stop is not heeded here: that takes a
-    /// reset at the rig.
+    /// Acts on the present states of guard and emergency stop. Releasing the stop has no effect
+    /// here: that requires a reset at the rig.
     pub fn heed(&mut self, interlock_closed: bool, pressed: bool) {
         if pressed && !self.emergency_stop {
             self.stop_everything();
@@ -320,7 +326,7 @@ impl State<'_> {
         }
     }
 
-    /// Latches the emergency stop.
+    /// Latches the emergency stop, disarms the hammer and halts the shaker.
     pub fn stop_everything(&mut self) {
         if !self.emergency_stop {
             warning!("emergency stop");
@@ -330,7 +336,7 @@ impl State<'_> {
         self.disarm(Reason::EmergencyStop);
         let stops = self.shaker.halt(Reason::EmergencyStop);
         self.tell_of_shaker(stops);
-        // whatever states the machines believe in
+        // independently of the state machines' states
         self.coil = Some(CoilOrder::Off);
         self.drive_off = true;
     }
@@ -345,7 +351,7 @@ impl State<'_> {
         self.friction_n
     }
 
-    /// The report of the oldest loss of scans that the host does not know of.
+    /// The event for the oldest loss of scans that has not been reported to the host.
     pub fn take_loss(&mut self) -> Option<event::Numbered> {
         let (range, why) = self.ring.take_loss()?;
         let scans = u32::try_from(range.scans).unwrap_or(u32::MAX);

@@ -1,4 +1,4 @@
-//! What the tasks share, without a board.
+//! Tests of the shared state, without a board.
 
 extern crate std;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -67,7 +67,7 @@ fn inputs_are_heeded_and_told_without_a_block() {
     assert_eq!(said(&core), [Event::Interlock(false), Event::Disarmed(Reason::Interlock)]);
     assert_eq!(core.with(|state| state.coil.take()), Some(CoilOrder::Off));
     assert_eq!(core.with(|state| state.may_move()), Err(Refusal::Interlock));
-    // the same again: nothing new to tell, but still an order
+    // the same inputs again: no new event, but still an order
     assert!(core.see_inputs(false, false));
     assert_eq!(said(&core), []);
     assert_eq!(core.with(|state| state.coil.take()), Some(CoilOrder::Off));
@@ -85,7 +85,7 @@ fn an_emergency_stop_stays_when_its_button_is_released() {
     assert!(core.with(|state| core::mem::take(&mut state.drive_off)));
     assert!(!core.see_inputs(true, false));
     assert!(!core.with(|state| state.drive_off));
-    // pressed again while it is latched: nothing new to tell, but still an order
+    // pressed again while latched: no new event, but still an order
     assert!(core.see_inputs(true, true));
     assert!(core.with(|state| state.drive_off));
     assert!(!core.see_inputs(true, false));
@@ -97,7 +97,8 @@ fn an_emergency_stop_stays_when_its_button_is_released() {
 fn no_two_streams_of_some_starts_have_one_epoch() {
     let channels = [channel(Role::HammerForce)];
     let mut epochs = Vec::new();
-    // a number of the RNG's, and the resets after it, over the end of what an epoch holds of it
+    // a random number and the resets after it, across the wrap of its low 16 bits, which an epoch
+    // contains
     for boot in [0xCAFE_FFFE_u32, 0xCAFE_FFFF, 0xCAFF_0000] {
         let mut slots = [Slot::EMPTY; 2];
         let mut core = armed(&channels, &mut slots);
@@ -116,7 +117,7 @@ fn no_two_streams_of_some_starts_have_one_epoch() {
     assert_eq!(epochs.len(), 9);
 }
 
-/// A link that takes everything.
+/// A link that accepts everything.
 struct Wire<'a>(&'a RefCell<Vec<u8>>);
 
 impl crate::board::ByteSink for Wire<'_> {
@@ -145,18 +146,18 @@ fn transmits(core: &Core<'_, NoopRawMutex>) -> Vec<(Kind, Vec<u8>)> {
     frames
 }
 
-/// The events among them.
+/// The events among `frames`.
 fn events(frames: &[(Kind, Vec<u8>)]) -> Vec<event::Numbered> {
     let own = frames.iter().filter(|(kind, _)| *kind == Kind::Event);
     own.map(|(_, payload)| postcard::from_bytes(payload).expect("an event")).collect()
 }
 
-/// A host shakes hands in a session of its own.
+/// Performs the handshake of a host with this session number.
 fn greet(core: &Core<'_, NoopRawMutex>, session: u32) {
     core.greet(&Hello::host(session).to_bytes());
 }
 
-/// The same in a session whose host reads COBS.
+/// As [`armed`], in a session whose host reads COBS.
 fn in_session<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRawMutex> {
     let core = armed(channels, slots);
     core.with(|state| state.session = Some(1));
@@ -181,7 +182,7 @@ fn a_new_session_receives_no_shot_of_the_session_before_and_every_fault() {
     let core = in_session(&channels, &mut slots);
     core.report_fault("a converter");
     core.carry_out(&fire(37), &mut NoStage).expect("armed");
-    // this session reads nothing, and its host is killed while the shot waits
+    // the link of this session sends nothing, and its host ends while the shot waits
     core.with(|state| {
         state.say(Event::Armed);
         state.say(Event::Counters(state.counters));
@@ -207,7 +208,7 @@ fn a_shot_number_is_used_once_in_all_sessions_of_a_start() {
     let Ok(Answer::Status(status)) = core.carry_out(&Request::Status, &mut NoStage) else {
         panic!("a status can always be asked for");
     };
-    // by this a host knows which numbers are free
+    // from this, a host knows which numbers are unused
     assert_eq!(status.shot.map(|shot| (shot.number, shot.phase)), Some((1, Phase::Cancelled)));
     assert_eq!(core.carry_out(&fire(2), &mut NoStage), Ok(Answer::Scheduled { number: 2 }));
 }
@@ -219,7 +220,7 @@ fn counters_displace_no_other_event() {
     let core = armed(&channels, &mut slots);
     core.with(|state| {
         state.session = Some(1);
-        // a minute of a link that takes nothing
+        // a minute on a link that accepts nothing
         for _ in 0..60 {
             state.say(Event::Counters(Counters::default()));
         }

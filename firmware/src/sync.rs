@@ -1,7 +1,9 @@
-//! In step with another recorder: which clock times the scans, edges at the sync input, pulses of the output.
+//! Synchronisation with another recorder: scan clock, edges at the sync input, pulses of the sync
+//! output.
 //!
-//! Nothing here moves anything: an edge is told, and a pulse follows what hammer and host do. An external clock that fails is a failed
-//! front end: the stream ends, everything comes to rest, and the scans go on by the board's own crystal.
+//! Nothing here causes motion: an edge is reported, and a pulse marks an action of hammer or host.
+//! An external clock that fails is treated as a failed front end: the stream ends, everything comes
+//! to rest, and scans continue with the board's own crystal.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::answer::{Answer, Refusal};
@@ -15,17 +17,17 @@ use crate::ruler::Ago;
 use crate::state::State;
 
 impl State<'_> {
-    /// The output is to pulse with the next block.
+    /// Requests a pulse of the sync output with the next block.
     pub fn mark(&mut self, line: Line) {
         self.in_step.due = Some(line);
     }
 
-    /// Whether scans must be taken without a stream, because an external clock is measured by them.
+    /// Whether scans must be taken without a stream, because an external clock is being measured.
     pub fn clock_is_measured(&self) -> bool {
         self.in_step.now.fault == Some(ClockFault::Unproven)
     }
 
-    /// A session has ended: its clock is forgotten.
+    /// Resets the clock at the end of a session.
     pub fn forget_clock(&mut self) {
         if self.in_step.now.clock != Clock::Internal || self.in_step.now.fault.is_some() {
             self.in_step.take(Clock::Internal);
@@ -37,7 +39,7 @@ impl State<'_> {
         self.say(Event::Edge(Edge { line, number, at: Moment { scan, part: ago.part } }));
     }
 
-    /// The clock is not good: what it timed ends.
+    /// Handles a faulty clock: ends the stream, and brings everything to rest.
     fn lose_clock(&mut self, fault: ClockFault) {
         let asked = self.in_step.now.clock;
         self.in_step.take(Clock::Internal);
@@ -57,7 +59,7 @@ impl State<'_> {
             self.say_edge(Line::Input, number, ago);
         }
         let Some(span) = seen.span else { return };
-        // a span of the clock before, or of one that was given up
+        // a span of the previous clock, or of one that is no longer used
         if self.in_step.order.is_some() || self.in_step.now.clock == Clock::Internal {
             return;
         }
@@ -72,13 +74,13 @@ impl State<'_> {
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// What a board has seen beside the block that was just taken.
+    /// Processes the activity at the sync port during the block that was just taken.
     #[inline(never)]
     pub(crate) fn see(&self, seen: Seen, period: u32) {
         self.with(|state| state.see(seen, period));
     }
 
-    /// Lets the board do what is due.
+    /// Lets the board carry out pending actions.
     #[inline(never)]
     pub(crate) fn keep_in_step(&self, scans: &mut impl Scans) {
         let (order, due) = self.with(|state| (state.in_step.order.take(), state.in_step.due.take()));
@@ -97,7 +99,7 @@ impl<M: RawMutex> Core<'_, M> {
         }
     }
 
-    /// The scans are to have this clock.
+    /// Selects the scan clock.
     pub(crate) fn ask_for_clock(&self, clock: Clock) -> Result<Answer, Refusal> {
         if !self.facts.sync {
             return Err(Refusal::Unsupported);

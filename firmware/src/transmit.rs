@@ -1,8 +1,9 @@
-//! Transmitting: answers first, then lost scans, then other events, then blocks sent again, then new blocks, then log lines.
+//! Transmitting: replies first, then lost scans, then other events, then retransmitted blocks, then
+//! new blocks, then log lines.
 //!
-//! A request is therefore never starved by samples: it waits for at most the one frame that is on its
-//! way. When the link is slower than the samples, blocks wait in the ring, and what leaves it unsent is
-//! reported as a range before the next block goes out.
+//! Samples therefore never starve a request: its reply waits for at most the one frame being sent.
+//! When the link is slower than the samples, blocks wait in the ring; those that leave it unsent
+//! are reported as a range before the next block is sent.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use jointrig_protocol::block::{HEADER_PAYLOAD, RESENT};
@@ -15,10 +16,10 @@ use crate::logs::Tap;
 use crate::ring::Out;
 use crate::state::State;
 
-/// Runs for ever.
+/// Runs forever.
 pub async fn transmit<M: RawMutex, S: ByteSink>(core: &Core<'_, M>, sink: &mut S) -> ! {
     let mut writer = Writer::new(Kind::Hello);
-    // whether what was sent last ended with a zero, as COBS needs it before the next frame
+    // whether the last bytes sent ended with a zero, which COBS requires before the next frame
     let mut ended = true;
     let mut more = true;
     loop {
@@ -34,7 +35,7 @@ pub async fn transmit<M: RawMutex, S: ByteSink>(core: &Core<'_, M>, sink: &mut S
             sink.write(&[0]).await;
         }
         let sealed = if next.packet { writer.seal_packet(next.payload) } else { writer.seal(next.payload) };
-        // every frame that is built here fits: the golden vectors hold the largest of each kind
+        // every frame built here fits: the golden vectors contain the largest of each kind
         if let Ok(frame) = sealed {
             sink.write(frame).await;
             ended = !next.packet;
@@ -42,18 +43,18 @@ pub async fn transmit<M: RawMutex, S: ByteSink>(core: &Core<'_, M>, sink: &mut S
     }
 }
 
-/// A frame that was written and is not sealed yet.
+/// A frame that is written but not yet sealed.
 struct Next {
-    /// Bytes of its payload.
+    /// Length of its payload in bytes.
     payload: usize,
-    /// It goes as a packet, not in COBS.
+    /// Send as a packet instead of COBS.
     packet: bool,
-    /// Something else may wait behind it.
+    /// Something else may be waiting.
     more: bool,
 }
 
 impl<M: RawMutex> Core<'_, M> {
-    /// Writes the most urgent payload; its length, or `None` when there is nothing to send.
+    /// Writes the most urgent payload; returns its length, or `None` when there is nothing to send.
     fn next_frame(&self, writer: &mut Writer) -> Option<Next> {
         self.with(|state| {
             if let Some(session) = state.hello_due.take() {
@@ -62,13 +63,14 @@ impl<M: RawMutex> Core<'_, M> {
             }
             state.session?;
             let payload = state.next_payload(writer).or_else(|| self.log_lines(writer))?;
-            // the newest block is the last thing in a stream that keeps up
+            // on a link that keeps up, nothing is left after the newest block
             let more = state.is_behind() || self.logs.is_some_and(Tap::waits);
             Some(Next { payload, packet: state.packets, more })
         })
     }
 
-    /// Lines wait until the next look, a tenth of a second at most: none is worth a wake-up of its own.
+    /// Writes log lines. Lines wait for the next periodic wake-up, a tenth of a second at most:
+    /// they do not wake the task themselves.
     fn log_lines(&self, writer: &mut Writer) -> Option<usize> {
         let length = self.logs.filter(|tap| tap.waits())?.take(writer.payload_mut())?;
         writer.restart(Kind::Log);
@@ -85,17 +87,17 @@ impl State<'_> {
         bytes.len()
     }
 
-    /// Whether anything but log lines waits.
+    /// Whether anything but log lines is waiting.
     fn is_behind(&self) -> bool {
         self.ring.unsent() > 0 || self.has_words() || !self.resends.is_empty()
     }
 
-    /// Whether answers, events or a report of a loss wait.
+    /// Whether replies, events or the report of a loss are waiting.
     pub fn has_words(&self) -> bool {
         !self.answers.is_empty() || !self.events.is_empty() || self.ring.has_loss()
     }
 
-    /// What is most urgent of all but log lines.
+    /// Writes the most urgent payload, log lines excluded.
     fn next_payload(&mut self, writer: &mut Writer) -> Option<usize> {
         if self.has_words()
             && let Some(length) = self.next_word(writer)
@@ -105,7 +107,7 @@ impl State<'_> {
         if self.resends.is_empty() { self.new_block(writer) } else { self.resent_block(writer) }
     }
 
-    /// The next answer or event.
+    /// Writes the next reply or event.
     #[inline(never)]
     fn next_word(&mut self, writer: &mut Writer) -> Option<usize> {
         while let Some(answer) = self.answers.pop_front() {
@@ -139,7 +141,7 @@ impl State<'_> {
                     }
                     return Some(length);
                 }
-                // it left the ring meanwhile: the host asks again and hears that it is gone
+                // it left the ring meanwhile: the host asks again and is told that it is gone
                 _ => drop(self.resends.pop_front()),
             }
         }

@@ -1,5 +1,5 @@
-//! Watching: a silent host disarms the hammer and stops the shaker, as does a silent front end; dropped log lines are
-//! counted, and the counters are told once a second.
+//! Watchdog of link and front end: a silent host or a silent front end disarms the hammer and stops
+//! the shaker. Also counts dropped log lines and reports the counters once a second.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, Instant, Timer};
@@ -10,12 +10,12 @@ use jointrig_protocol::limits::{LINK_SILENCE_MS, SCAN_SILENCE_MS};
 use crate::Core;
 use crate::fmt::warning;
 
-/// How often the host's silence is checked.
+/// Interval of the checks.
 const PERIOD: Duration = Duration::from_millis(100);
-/// Periods between two reports of the counters.
+/// Check intervals between two reports of the counters.
 const REPORT_EVERY: u32 = 10;
 
-/// Runs for ever.
+/// Runs forever.
 pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
     let mut periods = 0_u32;
     loop {
@@ -32,7 +32,8 @@ pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
             let blind = Instant::now().saturating_duration_since(state.last_block).as_millis();
             if (armed || shakes) && blind >= u64::from(SCAN_SILENCE_MS) {
                 warning!("no scans: everything comes to rest");
-                // its ramp waits for the next block, as its codes do: without blocks the drive rests already
+                // the ramp needs the next block for its codes; without blocks the drive is already
+                // at rest
                 state.bring_to_rest(Reason::FrontEnd);
             }
             if let Some(tap) = core.logs {

@@ -1,5 +1,6 @@
-//! The whole firmware behind its USB device, with the host in the same process: what a host that does not read, and
-//! a bus that is reset, cost. Time stands still in here; what needs it to pass is tested in hil-sim.
+//! The whole firmware with its USB device, and the host in the same process: effects of a host that
+//! does not read, and of a bus reset. Time does not advance here; what depends on time is tested in
+//! hil-sim.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 #[path = "it/usb/bus.rs"]
@@ -31,11 +32,11 @@ use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 use jointrig_protocol::request::{self, Request};
 
-/// Blocks of 15 scans in a second at 51.2 kHz; the ring of the tests holds as many.
+/// Blocks of 15 scans per second at 51.2 kHz; the ring in these tests holds this many.
 const SECOND: usize = 3_414;
 const SCANS: u64 = 15;
 
-/// Converters that deliver as many blocks as the test says.
+/// Converters that deliver as many blocks as the test requests.
 struct OnDemand<'a> {
     due: &'a Cell<usize>,
     block: u16,
@@ -49,7 +50,7 @@ impl Scans for OnDemand<'_> {
         self.due.set(self.due.get() - 1);
         block.as_chunks_mut::<2>().0.fill(self.block.to_le_bytes());
         self.block = (self.block + 1) % 30_000;
-        // one block at a time, as the timer would have it
+        // one block at a time, as with the timer
         yield_now().await;
         Delivered { scans: SCANS as u8, missed: 0, loud: true }
     }
@@ -131,7 +132,7 @@ fn run<F: Future<Output = ()>>(speed: Speed, scenario: impl FnOnce(Session) -> F
     assert!(matches!(block_on(select(device, scenario(session))), Either::Second(())));
 }
 
-/// A small host: it greets, asks, and sorts what comes.
+/// A minimal host: performs the handshake, sends requests, and sorts the received data.
 struct Session {
     host: Host,
     speed: Speed,
@@ -141,13 +142,13 @@ struct Session {
     waiting: RefCell<Vec<Heard>>,
 }
 
-/// What the device said.
+/// Data received from the device.
 #[derive(Debug, Clone)]
 enum Heard {
     Hello,
     Answer(answer::Numbered),
     Event(Event),
-    /// First scan, first code, whether it was sent again.
+    /// First scan, first code, whether it was retransmitted.
     Block(u64, i16, bool),
     /// Encoded log lines.
     Log(Vec<u8>),
@@ -192,7 +193,7 @@ impl Session {
         }
     }
 
-    /// Asks; what comes before the answer is kept for [`Self::next`].
+    /// Sends a request; data received before the reply are kept for [`Self::next`].
     async fn ask(&self, way: Interface, request: Request) -> Answer {
         let number = self.number.replace(self.number.get() + 1);
         let mut frame = Writer::new(Kind::Request);
@@ -228,7 +229,8 @@ impl Session {
     }
 }
 
-/// Reads until `blocks` blocks are accounted for; returns those that came and how many scans were reported lost.
+/// Reads until `blocks` blocks are accounted for; returns the received blocks and the number of
+/// scans reported lost.
 async fn collect(session: &Session, way: Interface, blocks: usize) -> (Vec<(u64, i16)>, u64) {
     let (mut came, mut lost) = (Vec::new(), 0);
     while came.len() as u64 * SCANS + lost < blocks as u64 * SCANS {
@@ -269,11 +271,11 @@ fn after_five_seconds_the_loss_is_a_range_and_nothing_is_unexplained() {
         session.ask(way, Request::Start).await;
         session.produce(5 * SECOND).await;
         let (came, lost) = collect(&session, way, 5 * SECOND).await;
-        // the ring's second, and the block or two that were on their way
+        // one second of the ring, and the one or two blocks in transit
         assert!((SECOND..SECOND + 3).contains(&came.len()), "{}", came.len());
         assert_eq!(came.len() as u64 * SCANS + lost, 5 * SECOND as u64 * SCANS);
         assert_eq!(came.last().unwrap().0, (5 * SECOND as u64 - 1) * SCANS, "up to the newest");
-        // and requests are answered as ever
+        // and requests are answered as before
         assert!(matches!(session.ask(way, Request::Status).await, Answer::Status(_)));
     });
 }
@@ -328,7 +330,7 @@ fn requests_are_answered_while_nobody_reads_the_blocks() {
         session.ask(way, Request::Start).await;
         session.produce(SECOND / 2).await;
         session.ask(way, Request::Info).await;
-        // the one block in the FIFO and the one in hand are all that came before the answer
+        // at most the block in the FIFO and the current block arrive before the reply
         assert!(session.waiting.borrow().len() <= 2, "{}", session.waiting.borrow().len());
     });
 }
@@ -343,7 +345,7 @@ fn what_a_bus_reset_swallowed_can_be_asked_for_again() {
         session.produce(10).await;
         let (before, _) = collect(&session, way, 4).await;
         assert_eq!(before.len(), 4);
-        // the block in the FIFO goes with the reset; the same session goes on
+        // the block in the FIFO is lost in the reset; the same session continues
         let way = session.plug().await;
         session.produce(10).await;
         let mut came: Vec<u64> = before.iter().map(|(first, _)| *first).collect();
@@ -364,7 +366,7 @@ fn what_a_bus_reset_swallowed_can_be_asked_for_again() {
     });
 }
 
-/// Time that stands still: nothing here waits for it.
+/// A clock that does not advance: nothing here waits for time.
 #[allow(unsafe_code, reason = "embassy's time driver is an unmangled symbol")]
 mod clock {
     struct Still;

@@ -1,4 +1,5 @@
-//! The host's cumulative acknowledgement: 12 bytes, little-endian. It is also its sign of life.
+//! The host's cumulative acknowledgement: 12 bytes, little-endian. It also serves as the host's
+//! sign of life.
 
 /// Everything before `next_scan` of stream `epoch` has arrived and need not be kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,11 +10,11 @@ pub struct Acknowledge {
     pub next_scan: u64,
 }
 
-/// Length on the wire.
+/// Encoded length in bytes.
 pub const BYTES: usize = 12;
 
 impl Acknowledge {
-    /// Epoch (u32), next scan (u64).
+    /// Encodes epoch (u32), then next scan (u64).
     #[must_use]
     pub fn to_bytes(&self) -> [u8; BYTES] {
         let mut out = [0; BYTES];
@@ -22,7 +23,7 @@ impl Acknowledge {
         out
     }
 
-    /// `None` unless exactly [`BYTES`] long.
+    /// Decodes; `None` unless exactly [`BYTES`] long.
     #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let b: &[u8; BYTES] = bytes.try_into().ok()?;

@@ -1,4 +1,4 @@
-//! What a device answers: the thing asked for, or a refusal that says why.
+//! Replies of the device: the requested data, or a refusal with its reason.
 
 use heapless::String;
 use postcard_schema::Schema;
@@ -11,17 +11,18 @@ use crate::shot::Shot;
 use crate::slow::{Slow, SupplyFault};
 use crate::sync::{ClockFault, Sync};
 
-/// The answer to the request of the same number.
+/// The reply to the request with the same number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Numbered {
     /// The request's number.
     pub number: u32,
-    /// What came of it.
+    /// The requested data, or the reason for the refusal.
     pub outcome: Result<Answer, Refusal>,
 }
 
 impl Numbered {
-    /// Writes it as a frame's payload; its length. Not generic, so that its code is this crate's and not each caller's.
+    /// Serialises into a frame's payload and returns the length. Not generic, so that its code is
+    /// compiled in this crate and not once per caller.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] when it does not fit.
@@ -30,31 +31,31 @@ impl Numbered {
     }
 }
 
-/// What was asked for. Variants only ever grow at the end.
+/// The requested data. New variants are only ever added at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Answer {
-    /// Who the device is.
+    /// Identity and properties of the device.
     Info(Info),
-    /// One channel.
+    /// Description of one channel.
     Channel(Channel),
-    /// How the device is.
+    /// State of the device.
     Status(Status),
     /// A stream has begun.
     Started {
-        /// Its epoch.
+        /// Its session epoch.
         epoch: u32,
-        /// Its channel map.
+        /// Its channel-map id.
         map: u8,
         /// Index of its first scan.
         first_scan: u64,
     },
-    /// Done, nothing to tell.
+    /// Done; there is no data to return.
     Done,
-    /// These scans are on their way again.
+    /// These scans are being sent again.
     Resending {
         /// First scan of the first block.
         first_scan: u64,
-        /// Scans in all.
+        /// Total number of scans.
         scans: u32,
     },
     /// The shot is accepted.
@@ -62,74 +63,74 @@ pub enum Answer {
         /// Its number.
         number: u32,
     },
-    /// Hammer and laser are in place from this scan on.
+    /// Hammer and laser are in position from this scan on.
     Staged {
-        /// The first scan for which that holds.
+        /// The first scan with both in position.
         at_scan: u64,
     },
-    /// Slow values.
+    /// Temperature and sensor supplies.
     Slow(Slow),
-    /// Clock and edges.
+    /// Clock state and edge counts.
     Sync(Sync),
 }
 
-/// Why a request was not carried out. Variants only ever grow at the end.
+/// Why a request was not carried out. New variants are only ever added at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Refusal {
-    /// This board cannot do that.
+    /// This board does not support the request.
     Unsupported,
-    /// The request could not be read.
+    /// The request could not be decoded.
     Unreadable,
-    /// The request's number is older than the memory of answers.
+    /// The request's number is older than the stored replies.
     Stale,
     /// There is no such channel.
     NoSuchChannel,
     /// No stream is running.
     NotStreaming,
-    /// Another stream runs.
+    /// Another stream is running.
     WrongEpoch {
-        /// The epoch that runs.
+        /// The epoch of the running stream.
         current: u32,
     },
-    /// The ring no longer holds what was asked for.
+    /// The ring no longer holds the requested scans.
     Gone {
-        /// The oldest scan that it holds.
+        /// The oldest scan in the ring.
         oldest: u64,
     },
     /// The hammer is not armed.
     NotArmed,
-    /// The hammer has a shot in hand.
+    /// A shot is in progress.
     Busy,
     /// The interlock is open.
     Interlock,
-    /// The emergency stop is latched: re-arm at the rig.
+    /// The emergency stop is latched: it must be reset at the rig.
     EmergencyStop,
-    /// The shaker runs.
+    /// The shaker is running.
     ShakerRuns,
-    /// The coil pulse is zero or over the cap.
+    /// The coil pulse is zero or exceeds the cap.
     PulseOutOfBounds {
-        /// The longest allowed, µs.
+        /// Longest allowed pulse, µs.
         cap_us: u32,
     },
-    /// This shot number was used before.
+    /// This shot number has already been used.
     ShotRepeated {
         /// The last number used.
         last: u32,
     },
-    /// A value is outside its bounds, or not finite.
+    /// A value is out of bounds or not finite.
     OutOfBounds(String<SENTENCE_BYTES>),
-    /// The stage cannot go there.
+    /// The stage cannot reach the requested position.
     Stage(String<SENTENCE_BYTES>),
-    /// The hammer is armed, or has a shot in hand.
+    /// The hammer is armed, or a shot is in progress.
     HammerArmed,
-    /// The constant-current supply of the channel that this needs finds no sensor.
+    /// The constant-current supply of a required channel detects no sensor.
     Supply {
-        /// The channel's place in the scan.
+        /// Index of the channel in the scan, from 0.
         channel: u8,
-        /// What it finds.
+        /// The fault detected.
         fault: SupplyFault,
     },
-    /// The clock that the scans are to have is not good, or not known to be.
+    /// The selected scan clock is faulty or has not been verified yet.
     Clock(ClockFault),
 }
 
@@ -166,51 +167,52 @@ impl core::fmt::Display for Refusal {
 
 impl core::error::Error for Refusal {}
 
-/// Who the device is.
+/// Identity and properties of the device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Info {
     /// Name of the board.
     pub board: Name,
     /// Serial number.
     pub serial: Name,
-    /// Firmware version, semantic.
+    /// Firmware version (semantic versioning).
     pub version: Name,
     /// Target triple that the firmware was built for.
     pub target: String<40>,
-    /// Identifies the build, and with it the table of log strings.
+    /// Identifies the build, and thus the matching table of log strings.
     pub build: u64,
     /// Channels in a scan.
     pub channels: u8,
     /// Scans per second.
     pub scan_rate_hz: u32,
-    /// Scans that can be sent again.
+    /// Scans that the ring holds for retransmission.
     pub ring_scans: u32,
     /// Longest coil pulse, µs.
     pub coil_cap_us: u32,
-    /// Whether it can be told where hammer and laser are.
+    /// Whether the device accepts the positions of hammer and laser
+    /// ([`crate::request::Request::Stage`]).
     pub stage: bool,
     /// Full scale of the shaker's drive, V; 0 without a shaker.
     pub drive_v: f32,
-    /// Why it started last.
+    /// Cause of the last reset.
     pub reset: Reset,
 }
 
-/// Why a device started.
+/// Cause of a device's last reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reset {
-    /// It does not say.
+    /// Not reported.
     #[default]
     Unknown,
-    /// Power came.
+    /// Power-on.
     Power,
-    /// The button, or a debugger's reset line.
+    /// Reset button, or a debugger's reset line.
     Pin,
-    /// Its program, after a panic or a fault, or a debugger.
+    /// Software reset: after a panic or a fault, or by a debugger.
     Software,
-    /// A watchdog: its program hung.
+    /// Watchdog reset: the program hung.
     Watchdog,
-    /// Its supply was too low for a moment.
+    /// Supply voltage briefly too low.
     Brownout,
 }
 
@@ -228,13 +230,13 @@ impl core::fmt::Display for Reset {
 }
 
 impl Info {
-    /// What the simulated rig in a process calls its board.
+    /// Board name of the simulated rig that runs within the host process.
     pub const VIRTUAL_BOARD: &'static str = "jointrig-sim";
-    /// What the emulated board calls itself, which measures a simulated rig too.
+    /// Board name of the emulated board, which also measures a simulated rig.
     pub const EMULATED_BOARD: &'static str = "mps2-an505";
 }
 
-/// What the hammer does.
+/// State of the hammer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Hammer {
@@ -242,82 +244,85 @@ pub enum Hammer {
     Disarmed,
     /// One shot is allowed until the arming expires.
     Armed,
-    /// A shot waits for its scan or for quiet.
+    /// A shot waits for its scan or for the structure to be quiet.
     Waiting,
-    /// The coil is on, or the bolt flies.
+    /// The coil is on, or the bolt is in flight.
     Firing,
-    /// Pulse and rebounds are being followed.
+    /// Pulse and rebounds are being recorded.
     Listening,
-    /// The hammer rests before the next arming.
+    /// Hold-off time after a shot; the next shot waits for its end.
     HoldOff,
 }
 
-/// What the shaker does.
+/// State of the shaker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Shaker {
-    /// Nothing.
+    /// At rest.
     Resting,
-    /// The amplitude is on its way to what was ordered.
+    /// The amplitude is ramping to the requested value.
     Slewing,
-    /// The amplitude is what was ordered.
+    /// The amplitude has the requested value.
     Steady,
-    /// The amplitude is on its way to rest.
+    /// The amplitude is ramping down to zero.
     Stopping,
 }
 
-/// Counters since the device started. They never go back within a boot.
+/// Counters of frames, events and logs since the device started, and of scans since the stream
+/// started. They never decrease, except that the latter restart with each stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Counters {
     /// Good frames received.
     pub frames_in: u32,
-    /// Frames received that were damaged or unknown.
+    /// Received frames that were damaged or of unknown kind.
     pub frames_bad: u32,
     /// Scans produced in this stream.
     pub scans_produced: u64,
     /// Scans sent for the first time in this stream.
     pub scans_sent: u64,
-    /// Scans sent again in this stream.
+    /// Scans retransmitted in this stream.
     pub scans_resent: u64,
-    /// Scans that left the ring unsent in this stream: lost, and reported as ranges.
+    /// Scans that left the ring unsent in this stream; they are lost and reported as ranges.
     pub scans_dropped: u64,
     /// Scans that the front end failed to deliver in this stream.
     pub scans_missed: u64,
-    /// Events that were dropped because their queue was full.
+    /// Events dropped because their queue was full.
     pub events_dropped: u32,
-    /// Log frames that were dropped.
+    /// Log frames dropped.
     pub logs_dropped: u32,
 }
 
-/// How the device is.
+/// State of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Status {
-    /// Epoch of the stream that runs, or of the last one.
+    /// Epoch of the running stream, or of the last one.
     pub epoch: u32,
-    /// Whether a stream runs.
+    /// Whether a stream is running.
     pub streaming: bool,
     /// The next scan that will be produced.
     pub next_scan: u64,
-    /// The oldest scan that can be sent again.
+    /// The oldest scan that can be retransmitted.
     pub oldest_scan: u64,
-    /// What the hammer does.
+    /// State of the hammer.
     pub hammer: Hammer,
-    /// Remaining arming, ms.
+    /// Remaining arming time, ms.
     pub armed_for_ms: u32,
     /// Whether the interlock is closed.
     pub interlock_closed: bool,
     /// Whether the emergency stop is latched.
     pub emergency_stop: bool,
-    /// Friction force of the last block, N: mean of the load cells through their calibration matrix.
+    /// Friction force of the last block, N: mean of the load cells, corrected with their
+    /// calibration matrix.
     pub friction_n: f32,
     /// The last shot, if any.
     pub shot: Option<Shot>,
-    /// What the shaker does.
+    /// State of the shaker.
     pub shaker: Shaker,
-    /// Amplitude of its drive now, V.
+    /// Present amplitude of its drive, V.
     pub drive_v: f32,
-    /// Amplitude that was last measured of what is controlled, m or N; 0 when the drive itself is.
+    /// Last measured amplitude of the controlled quantity, m or N; 0 when the drive itself is
+    /// controlled.
     pub controlled: f32,
-    /// What was sent and lost.
+    /// Counters of data sent and lost.
     pub counters: Counters,
 }

@@ -10,33 +10,37 @@
 //! | 8 | 8 | absolute index of the first scan |
 //! | 16 | … | scans: for each, one two's-complement 16-bit code per channel |
 //!
-//! The scan index is the only clock for results. It advances whether or not a block is delivered, so
-//! that loss is a range and never a guess; a restart is a new epoch and never a gap.
+//! The scan index is the only clock for results. It advances whether or not a block is delivered,
+//! so
+//!
+//! The scan index is the only time base for results. It advances whether or not a block is
+//! delivered, so that a loss is an exact range of scans. A restart begins a new epoch and never
+//! shows as a gap.
 
 use crate::limits::{BLOCK_HEADER_BYTES, BLOCK_SAMPLE_BYTES};
 
 /// Bytes of the header that are payload (all but the kind byte).
 pub const HEADER_PAYLOAD: usize = BLOCK_HEADER_BYTES - 1;
 
-/// Some channel touched either end of its converter's range.
+/// At least one channel reached either end of its converter's range.
 pub const OVER_RANGE: u8 = 1;
 /// The hammer's trigger lies in this block.
 pub const TRIGGER: u8 = 1 << 1;
-/// Scans before this block were lost in the device and can never be asked for.
+/// Scans before this block were lost in the device and cannot be requested again.
 pub const GAP: u8 = 1 << 2;
-/// Sent again on request.
+/// Retransmitted on request.
 pub const RESENT: u8 = 1 << 3;
 
 /// A block's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// [`OVER_RANGE`], [`TRIGGER`], [`GAP`], [`RESENT`].
+    /// Any of [`OVER_RANGE`], [`TRIGGER`], [`GAP`], [`RESENT`].
     pub flags: u8,
-    /// Which channel map the samples follow.
+    /// Id of the channel map of the samples.
     pub map: u8,
     /// Scans in the block.
     pub scans: u8,
-    /// Which stream.
+    /// Session epoch of the stream.
     pub epoch: u32,
     /// Absolute index of the first scan.
     pub first_scan: u64,
@@ -48,14 +52,15 @@ impl Header {
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "built for size it would be a call for every block")]
     pub fn to_bytes(&self) -> [u8; HEADER_PAYLOAD] {
-        // not by copies of slices: built for size, each of those is three calls, and this is done for every block
+        // Slice copies are avoided: when built for size, each becomes three calls, and this runs
+        // for every block.
         let [a, b, c, d] = self.epoch.to_le_bytes();
         let [e, f, g, h, i, j, k, l] = self.first_scan.to_le_bytes();
         [self.flags, self.map, self.scans, a, b, c, d, e, f, g, h, i, j, k, l]
     }
 }
 
-/// A received block: header and raw sample bytes, checked to be whole scans.
+/// A received block: header and raw sample bytes, verified to be whole scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block<'a> {
     /// Its header.
@@ -64,8 +69,9 @@ pub struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// Reads a frame's payload. `None` when it is too short, holds no scan, or its length is not a
-    /// whole number of 16-bit channels per scan.
+    /// Decodes a frame's payload. `None` when it is too short, too long or contains no scan, when
+    /// its length is not a whole number of 16-bit channels per scan, or when the scan index would
+    /// overflow.
     #[must_use]
     pub fn from_payload(payload: &'a [u8]) -> Option<Self> {
         let (h, samples) = payload.split_first_chunk::<HEADER_PAYLOAD>()?;
@@ -94,7 +100,7 @@ impl<'a> Block<'a> {
         self.samples.len() / (2 * usize::from(self.header.scans))
     }
 
-    /// The scan after the last one.
+    /// Index of the scan after the last one.
     #[must_use]
     pub fn end_scan(&self) -> u64 {
         self.header.first_scan + u64::from(self.header.scans)

@@ -1,4 +1,4 @@
-//! What a channel of the scan is: enough to turn its codes into SI units without asking anybody.
+//! Description of a scan's channel, sufficient to convert its codes to SI units.
 
 use heapless::String;
 use postcard_schema::Schema;
@@ -20,12 +20,12 @@ pub enum Quantity {
     Displacement,
     /// Acceleration, m/s².
     Acceleration,
-    /// A voltage that stands for itself, V.
+    /// Voltage that represents no other quantity, V.
     Voltage,
 }
 
 impl Quantity {
-    /// Its SI unit's symbol.
+    /// Symbol of the SI unit.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -38,7 +38,7 @@ impl Quantity {
     }
 }
 
-/// What a channel serves for: the firmware and the host find their inputs by role, never by name or place.
+/// Purpose of a channel: firmware and host find their inputs by role, never by name or position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Role {
     /// The hammer's force sensor.
@@ -68,21 +68,21 @@ pub enum Axis {
     Z,
 }
 
-/// One channel of the scan. A value in SI units is `code / 32768 × range_v × units_per_volt`, its
-/// polarity being the scale's sign.
+/// One channel of the scan. A value in SI units is `code / 32768 × range_v × units_per_volt`; the
+/// sign of the scale is the polarity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Channel {
-    /// Unique in the map.
+    /// Name, unique in the channel map.
     pub name: Name,
-    /// What it serves for.
+    /// Purpose of the channel.
     pub role: Role,
-    /// What it measures; the unit follows ([`Quantity::unit`]).
+    /// Measured quantity; it determines the unit ([`Quantity::unit`]).
     pub quantity: Quantity,
     /// SI units per volt at the converter, sign included.
     pub units_per_volt: f32,
     /// Full scale of the converter, ± V.
     pub range_v: f32,
-    /// By how much the sample lags the physical quantity, in ns (decoder and converter).
+    /// Delay of the sample relative to the physical quantity, ns (decoder and converter).
     pub delay_ns: u32,
     /// Bits of the converter that carry information (16, or 18 rounded to 16).
     pub bits: u8,
@@ -95,8 +95,9 @@ impl Channel {
         f64::from(self.units_per_volt) * f64::from(self.range_v) / 32_768.0
     }
 
-    /// The same, for a controller that has no double precision: equal to [`Channel::units_per_code`] rounded once, because the
-    /// division only moves the exponent.
+    /// SI units per code in single precision, for a controller without double precision: equal to
+    /// [`Channel::units_per_code`] with a single rounding, because the division by 32 768 only
+    /// changes the exponent.
     #[must_use]
     pub fn units_per_code_f32(&self) -> f32 {
         self.units_per_volt * self.range_v / 32_768.0

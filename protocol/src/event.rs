@@ -1,5 +1,6 @@
-//! What a device says unasked. Events inform; everything a host must know can also be asked
-//! ([`crate::answer::Status`]), so that a lost event loses nothing.
+//! Events: unsolicited messages of the device. They are for information only: everything that a
+//! host must know can also be requested ([`crate::answer::Status`]), so a lost event loses no
+//! information.
 
 use heapless::String;
 use postcard_schema::Schema;
@@ -14,16 +15,17 @@ use crate::sync::{ClockFault, Edge};
 /// A numbered event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Numbered {
-    /// Counts events since the device started; a jump tells how many were lost.
+    /// Counts events since the device started; a jump shows how many were lost.
     pub number: u32,
-    /// The scan at which it happened.
+    /// The scan at which the event occurred.
     pub at_scan: u64,
-    /// What happened.
+    /// The event.
     pub event: Event,
 }
 
 impl Numbered {
-    /// Writes it as a frame's payload; its length. Not generic, so that its code is this crate's and not each caller's.
+    /// Serialises into a frame's payload and returns the length. Not generic, so that its code is
+    /// compiled in this crate and not once per caller.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] when it does not fit.
@@ -32,7 +34,7 @@ impl Numbered {
     }
 }
 
-/// What happened. Variants only ever grow at the end.
+/// What happened. New variants are only ever added at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Event {
     /// The hammer is armed.
@@ -41,18 +43,18 @@ pub enum Event {
     Disarmed(Reason),
     /// A shot reached a new phase.
     Shot(Shot),
-    /// Scans were lost in the device: they cannot be asked for again.
+    /// Scans were lost in the device and cannot be requested again.
     Lost {
-        /// Which stream.
+        /// Session epoch of the stream.
         epoch: u32,
         /// First scan lost.
         first_scan: u64,
-        /// How many.
+        /// Number of scans lost.
         scans: u32,
-        /// Why.
+        /// Cause of the loss.
         why: Loss,
     },
-    /// Once a second while a stream runs.
+    /// Counters, sent once a second while a stream runs.
     Counters(Counters),
     /// The emergency stop latched (true) or was reset at the rig (false).
     EmergencyStop(bool),
@@ -60,54 +62,58 @@ pub enum Event {
     Interlock(bool),
     /// A converter or another part reported a fault.
     Fault(String<SENTENCE_BYTES>),
-    /// The last run ended in a panic, and this is what it said.
+    /// The last run ended in a panic with this message.
     Panic(String<SENTENCE_BYTES>),
-    /// The shaker runs.
+    /// The shaker is running.
     ShakerRuns,
-    /// The shaker is being brought to rest.
+    /// The shaker is ramping down to rest.
     ShakerStops(Reason),
     /// The shaker has come to rest.
     ShakerRests,
     /// An edge at the sync input or output.
     Edge(Edge),
-    /// The external clock is not good, or not any more: the stream has ended, and everything comes to rest.
+    /// The external clock has not been proven good, or has failed: the stream has ended, and hammer
+    /// and shaker come to rest.
     Clock(ClockFault),
 }
 
-/// Why the hammer disarmed, or the shaker stops.
+/// Why the hammer was disarmed or the shaker stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reason {
-    /// The host asked for it.
+    /// Requested by the host.
     Asked,
-    /// The arming, or the order to the shaker, expired.
+    /// The arming, or the shaker request, expired.
     Expired,
     /// The shot is over.
     Fired,
-    /// The host was not heard for [`crate::limits::LINK_SILENCE_MS`].
+    /// Nothing was received from the host for [`crate::limits::LINK_SILENCE_MS`].
     LinkLost,
     /// The interlock opened.
     Interlock,
-    /// The emergency stop.
+    /// The emergency stop was triggered.
     EmergencyStop,
-    /// The stream ended or began anew.
+    /// The stream ended or was restarted.
     StreamEnded,
-    /// A channel went beyond the limit of the order to the shaker.
+    /// A channel exceeded its limit in the shaker request.
     Limit {
-        /// Place in the scan, from 0.
+        /// Index in the scan, from 0.
         channel: u8,
     },
-    /// What the shaker controls is half as large again as ordered.
+    /// The controlled quantity stays more than a quarter above its requested amplitude, although
+    /// the drive is reduced.
     Runaway,
-    /// The largest drive that the order allows does not reach the ordered amplitude.
+    /// The largest drive that the request allows does not reach the requested amplitude.
     Weak,
-    /// The drive was given its codes too late, and rests.
+    /// Drive samples were supplied too late; the drive is at rest.
     RanDry,
-    /// The front end lost scans, or none came for [`crate::limits::SCAN_SILENCE_MS`]: nothing moves blindly.
+    /// The front end lost scans, or delivered none for [`crate::limits::SCAN_SILENCE_MS`]; nothing
+    /// may move without measured data.
     FrontEnd,
-    /// The sensor that this needs is not there: the supply of its channel finds an open cable or a short.
+    /// A required sensor is missing: the supply of its channel detects an open cable or a short
+    /// circuit.
     Supply {
-        /// Place in the scan, from 0.
+        /// Index in the scan, from 0.
         channel: u8,
     },
     /// The external clock was lost.
@@ -118,7 +124,7 @@ pub enum Reason {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Loss {
-    /// They left the ring before the link could carry them.
+    /// They left the ring before the link could send them.
     LinkSlow,
     /// The front end did not deliver them.
     FrontEnd,

@@ -1,19 +1,20 @@
-//! Frames: kind, payload, CRC-32 (ISO-HDLC, little-endian), in COBS, ended by zero.
+//! Frames: kind, payload and CRC-32 (ISO-HDLC, little-endian), COBS-encoded and terminated by zero.
 //!
-//! That is how they cross a stream of bytes. Where a link keeps packets apart, a device may send the same content behind a
-//! head instead ([`crate::packet`]): COBS costs a controller more than the CRC.
+//! This is the format on a byte stream. On a link that preserves packet boundaries, a device may
+//! send the same content after a packet head instead ([`crate::packet`]), because COBS costs a
+//! controller more time than the CRC.
 //!
-//! [`encode`] writes one; [`Accumulator`] finds them in a stream of any bytes at all. Whatever arrives,
-//! the accumulator uses bounded memory, does work proportional to the bytes it is given, and is back in
-//! step at the next zero byte. An oversized frame latches until that zero: its tail is never parsed
-//! as a frame of its own.
+//! [`encode`] writes one frame; [`Accumulator`] finds frames in an arbitrary byte stream. For any
+//! input, the accumulator uses bounded memory, does work proportional to the number of bytes, and
+//! resynchronises at the next zero byte. An oversized frame is latched until that zero: its tail is
+//! never parsed as a separate frame.
 
 use jointrig_hot::cobs::stuff;
 use jointrig_hot::crc32::checksum;
 
 use crate::limits::{CRC_BYTES, HEAD_BYTES, MAX_FRAME, MAX_PACKET, MAX_WIRE, WORD};
 
-/// What a frame carries. Kinds only ever grow at the end.
+/// Content of a frame. New kinds are only ever added at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -24,18 +25,18 @@ pub enum Kind {
     Request = 2,
     /// Device to host, postcard ([`crate::answer`]).
     Answer = 3,
-    /// Device to host, postcard, unasked ([`crate::event`]).
+    /// Device to host, postcard, unsolicited ([`crate::event`]).
     Event = 4,
     /// Device to host, fixed layout ([`crate::block`]).
     Samples = 5,
     /// Host to device, fixed layout ([`crate::acknowledge`]).
     Acknowledge = 6,
-    /// Device to host: encoded defmt, dropped first when the link is short.
+    /// Device to host: encoded defmt, dropped first when the link is too slow.
     Log = 7,
 }
 
 impl Kind {
-    /// The kind that a frame's first byte names, if this version knows it.
+    /// The kind for a frame's first byte; `None` if this version does not know it.
     #[must_use]
     pub const fn from_byte(byte: u8) -> Option<Self> {
         Some(match byte {
@@ -51,7 +52,7 @@ impl Kind {
     }
 }
 
-/// Why bytes were not a frame.
+/// Why bytes were not accepted as a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum FrameError {
@@ -59,7 +60,7 @@ pub enum FrameError {
     Overflow,
     /// Not COBS, or too short to hold a kind and a CRC.
     Malformed,
-    /// The CRC does not agree with the content.
+    /// The CRC does not match the content.
     Crc,
     /// A kind that this version does not know.
     UnknownKind(u8),
@@ -91,7 +92,7 @@ pub struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Kind, payload and CRC as they are without any encoding.
+    /// Parses kind, payload and CRC without COBS encoding.
     pub(crate) fn from_plain(plain: &'a [u8]) -> Result<Self, FrameError> {
         let (content, crc) = plain.split_last_chunk::<CRC_BYTES>().ok_or(FrameError::Malformed)?;
         let (kind, payload) = content.split_first().ok_or(FrameError::Malformed)?;
@@ -103,14 +104,15 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Four bytes before a packet: its frame's length and, so that a reader that is out of step finds its way, the length's complement.
+/// The four bytes before a packet: the length of its frame, and the complement of the length, so
+/// that a reader can resynchronise.
 #[inline]
 pub(crate) const fn head(length: usize) -> [u8; HEAD_BYTES] {
     let [low, high] = (length as u16).to_le_bytes();
     [low, high, !low, !high]
 }
 
-/// A frame on its way to the wire: content is written in place, then sealed.
+/// A frame to be sent: the content is written in place, then sealed.
 ///
 /// ```
 /// use jointrig_protocol::frame::{Kind, Writer};
@@ -121,7 +123,8 @@ pub(crate) const fn head(length: usize) -> [u8; HEAD_BYTES] {
 /// ```
 #[repr(C, align(4))]
 pub struct Writer {
-    /// A packet's head, and the frame. Aligned: a block's samples begin 20 bytes on, and are copied by words.
+    /// A packet's head followed by the frame. Aligned, because a block's samples begin at offset 20
+    /// and are copied word by word.
     packet: [u8; MAX_PACKET],
     wire: [u8; MAX_WIRE],
 }
@@ -135,19 +138,19 @@ impl Writer {
         Self { packet, wire: [0; MAX_WIRE] }
     }
 
-    /// Starts anew with another kind, keeping the memory.
+    /// Starts again with another kind, reusing the memory.
     #[inline]
     pub fn restart(&mut self, kind: Kind) {
         self.packet[HEAD_BYTES] = kind as u8;
     }
 
-    /// Where the payload goes: `MAX_FRAME − 5` bytes.
+    /// The payload's buffer: `MAX_FRAME − 5` bytes.
     #[inline]
     pub fn payload_mut(&mut self) -> &mut [u8] {
         &mut self.packet[HEAD_BYTES + 1..MAX_PACKET - CRC_BYTES]
     }
 
-    /// Adds the CRC over kind and the first `payload` bytes, and encodes.
+    /// Appends the CRC over the kind and the first `payload` bytes, and encodes with COBS.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] when `payload` is more than fits.
@@ -157,7 +160,7 @@ impl Writer {
         Ok(&self.wire[..length])
     }
 
-    /// The same as a packet ([`crate::packet`]): head, kind, payload, CRC.
+    /// As [`Writer::seal`], but as a packet ([`crate::packet`]): head, kind, payload, CRC.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] when `payload` is more than fits.
@@ -170,7 +173,7 @@ impl Writer {
         Ok(&self.packet[..whole])
     }
 
-    /// Writes the CRC over kind and payload behind them; where that ends.
+    /// Appends the CRC over kind and payload, and returns the end position.
     #[inline]
     fn add_crc(&mut self, payload: usize) -> Result<usize, FrameError> {
         let end = HEAD_BYTES + 1 + payload;
@@ -180,7 +183,7 @@ impl Writer {
         Ok(end + CRC_BYTES)
     }
 
-    /// Writes a postcard value as the payload, and seals.
+    /// Serialises `value` with postcard as the payload, and seals.
     ///
     /// # Errors
     /// [`FrameError::TooLong`] when the value does not fit.
@@ -190,7 +193,7 @@ impl Writer {
     }
 }
 
-/// Encodes one frame into `wire` and returns the part used, delimiter included.
+/// Encodes one frame into `wire` and returns the used part, delimiter included.
 ///
 /// # Errors
 /// [`FrameError::TooLong`] when payload or `wire` do not fit.
@@ -221,17 +224,17 @@ impl Default for Accumulator {
 }
 
 impl Accumulator {
-    /// In step, with nothing gathered.
+    /// An empty accumulator, synchronised to a frame boundary.
     #[must_use]
     pub const fn new() -> Self {
         Self { bytes: [0; MAX_WIRE], used: 0, overflowed: false }
     }
 
-    /// Takes bytes up to and including the next zero.
+    /// Consumes bytes up to and including the next zero.
     ///
-    /// Returns how many bytes were consumed and, when a zero was among them, what stood before it. Call
-    /// again with the rest. Empty frames (zeros in a row) are idle line, not errors. At least one byte
-    /// is consumed when `input` is not empty.
+    /// Returns the number of bytes consumed and, if a zero was among them, the frame before it.
+    /// Call again with the rest. Empty frames (consecutive zeros) are an idle line, not errors. At
+    /// least one byte is consumed when `input` is not empty.
     pub fn feed(&mut self, input: &[u8]) -> (usize, Option<Result<Frame<'_>, FrameError>>) {
         let Some(end) = input.iter().position(|byte| *byte == 0) else {
             self.gather(input);

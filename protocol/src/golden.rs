@@ -1,8 +1,8 @@
-//! Golden vectors: one frame of every kind (and every answer that carries data), byte for byte.
+//! Golden vectors: one frame of every kind (and every reply that carries data), byte for byte.
 //!
-//! The bytes are committed under `protocol/golden/`; [`for_each`] builds the same frames anew, so that
-//! one comparison runs on the PC, on the controller and in the emulator. `JOINTRIG_BLESS=1 cargo test
-//! -p jointrig-protocol` rewrites the files after a deliberate change of the contract.
+//! The bytes are committed under `protocol/golden/`. [`for_each`] builds the same frames again, so
+//! that one comparison runs on the PC, on the controller and in the emulator. `JOINTRIG_BLESS=1
+//! cargo test -p jointrig-protocol` rewrites the files after a deliberate change of the protocol.
 
 use heapless::{String, Vec};
 
@@ -61,7 +61,7 @@ golden!(
 
 fn text<const N: usize>(value: &str) -> String<N> {
     let mut out = String::new();
-    // what does not fit is left out: the committed bytes would tell
+    // text that does not fit is dropped: the comparison with the committed bytes would then fail
     let _ = out.push_str(value);
     out
 }
@@ -109,14 +109,15 @@ const STATUS: Status = Status {
     counters: COUNTERS,
 };
 
-/// Builds every vector and hands its name and wire bytes to `each`, in the order of [`COMMITTED`].
+/// Builds every vector and passes its name and wire bytes to `each`, in the order of [`COMMITTED`].
 ///
 /// # Errors
-/// [`FrameError::TooLong`] if one does not fit a frame, which would be a defect of the contract.
+/// [`FrameError::TooLong`] if a vector does not fit a frame, which would be a defect of the
+/// protocol.
 pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
     let mut frame = Writer::new(Kind::Hello);
-    // The golden Hello carries a fixed hash: the real one changes with every deliberate change, and is
-    // checked by the handshake itself.
+    // The golden Hello contains a fixed hash: the real one changes with every deliberate change of
+    // the protocol and is checked by the handshake.
     let hello = Hello { schema: 0x0123_4567_89ab_cdef, ..Hello::device(77, 3, 64_000) };
     debug_assert!(hello.role == HelloRole::Device);
     let bytes = hello.to_bytes();
@@ -180,7 +181,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
 
     let mut quiet_limits = Vec::new();
     for limit in [0.0, 2.5e-6, 2.5e-6] {
-        // three of sixteen fit
+        // three limits fit a vector with a capacity of sixteen
         let _ = quiet_limits.push(limit);
     }
     let mut shake_limits = Vec::new();
@@ -284,7 +285,7 @@ pub fn for_each(mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
     packets(&mut frame, each)
 }
 
-/// The other encoding: a Hello that announces packets, and two of them.
+/// Vectors in the other encoding: a Hello that announces packets, and two packets.
 fn packets(frame: &mut Writer, mut each: impl FnMut(&str, &[u8])) -> Result<(), FrameError> {
     let hello =
         Hello { schema: 0x0123_4567_89ab_cdef, packets: true, ..Hello::device(78, 3, 64_000) }.to_bytes();
@@ -303,7 +304,7 @@ fn packets(frame: &mut Writer, mut each: impl FnMut(&str, &[u8])) -> Result<(), 
     Ok(())
 }
 
-/// Writes a block in which every byte value appears, zeros among them; its length.
+/// Writes a block in which every byte value occurs, including zeros, and returns its length.
 fn block_of(frame: &mut Writer, scans: u8, channels: usize) -> usize {
     let header = Header { flags: TRIGGER | OVER_RANGE, map: 1, scans, epoch: 3, first_scan: 5_000_000_310 };
     let (head, samples) = frame.payload_mut().split_at_mut(crate::block::HEADER_PAYLOAD);
@@ -315,10 +316,10 @@ fn block_of(frame: &mut Writer, scans: u8, channels: usize) -> usize {
     crate::block::HEADER_PAYLOAD + used
 }
 
-/// Compares every vector with its committed bytes; the name of the first that differs, if any.
+/// Compares every vector with its committed bytes and returns the number of vectors.
 ///
 /// # Errors
-/// The name of the vector that differs or cannot be built.
+/// The name of the first vector that differs or cannot be built.
 pub fn check() -> Result<usize, &'static str> {
     let mut compared = 0;
     let mut differs = None;

@@ -1,4 +1,5 @@
-//! The handshake, frozen for ever: 32 bytes, little-endian, the first frame in each direction.
+//! The handshake, with a permanently frozen layout: 32 bytes, little-endian, the first frame in
+//! each direction.
 //!
 //! | offset | bytes | field |
 //! |---|---|---|
@@ -13,13 +14,12 @@
 //! | 24 | 4 | boot: the device's count of its own starts (0 from a host) |
 //! | 28 | 4 | ring: scans the device can send again (0 from a host) |
 //!
-//! Later versions may append; a reader takes the first 32 bytes. Appended is one byte so far:
+//! Later versions may append bytes; a reader uses the first 32 bytes. So far one byte is appended,
+//! at offset 32. Its bit 0 concerns packets ([`crate::packet`]). From a host: it can read them.
+//! From a device: it sends packets in this session, except this Hello.
 //!
-//! | 32 | 1 | bit 0: a host reads packets ([`crate::packet`]); a device sends packets in this session, this Hello excepted |
-//! |---|---|---|
-//!
-//! A session starts with a host's Hello
-//! carrying a new session number; the device forgets answers to earlier sessions' requests.
+//! A session starts with a host's Hello with a new session number; the device then discards the
+//! stored replies to earlier sessions' requests.
 
 use crate::{limits, schema};
 
@@ -29,13 +29,13 @@ pub const MAGIC: [u8; 4] = *b"JRIG";
 /// Length of the frozen part.
 pub const BYTES: usize = limits::HELLO_BYTES;
 
-/// Length with what is appended.
+/// Length including the appended byte.
 pub const LONG_BYTES: usize = BYTES + 1;
 
-/// Bit 0 of the byte behind the frozen part.
+/// Bit 0 of the byte after the frozen part.
 const PACKETS: u8 = 1;
 
-/// Who speaks.
+/// Which end sent the Hello.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// The host.
@@ -44,12 +44,12 @@ pub enum Role {
     Device,
 }
 
-/// One end's introduction.
+/// The Hello of one end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hello {
-    /// Another major is refused.
+    /// Major version; both ends must have the same.
     pub major: u16,
-    /// The lower minor of the two is spoken.
+    /// Minor version; the lower of the two is used.
     pub minor: u16,
     /// Hash of every type and layout on the wire ([`schema::HASH`]).
     pub schema: u64,
@@ -57,24 +57,24 @@ pub struct Hello {
     pub max_frame: u16,
     /// Most channels in a scan.
     pub max_channels: u8,
-    /// Who speaks.
+    /// Which end sent it.
     pub role: Role,
     /// Chosen by the host, echoed by the device.
     pub session: u32,
-    /// The device's count of its starts; it is the session epoch of its first stream.
+    /// The device's count of its starts; also the session epoch of its first stream.
     pub boot: u32,
-    /// Scans that the device can send again.
+    /// Scans that the device can retransmit.
     pub ring_scans: u32,
-    /// A host: it reads packets. A device: it sends them.
+    /// From a host: it can read packets. From a device: it sends packets.
     pub packets: bool,
 }
 
-/// Why two ends cannot talk.
+/// Why two ends are incompatible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mismatch {
     /// Not a Hello at all.
     NotHello,
-    /// Both ends claim the same role.
+    /// Both ends have the same role.
     Role,
     /// Different majors: (ours, theirs).
     Major(u16, u16),
@@ -105,7 +105,7 @@ impl core::fmt::Display for Mismatch {
 impl core::error::Error for Mismatch {}
 
 impl Hello {
-    /// This build's host side.
+    /// The Hello of a host with this build's version.
     #[must_use]
     pub const fn host(session: u32) -> Self {
         Self {
@@ -122,13 +122,13 @@ impl Hello {
         }
     }
 
-    /// This build's device side.
+    /// The Hello of a device with this build's version.
     #[must_use]
     pub const fn device(session: u32, boot: u32, ring_scans: u32) -> Self {
         Self { role: Role::Device, boot, ring_scans, ..Self::host(session) }
     }
 
-    /// The 32 frozen bytes, and what is appended.
+    /// The 32 frozen bytes and the appended byte.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; LONG_BYTES] {
         let mut out = [0; LONG_BYTES];
@@ -146,8 +146,8 @@ impl Hello {
         out
     }
 
-    /// Reads the frozen part and what is known of the rest; what later versions appended is ignored, and so may be what earlier ones
-    /// did not have.
+    /// Decodes the frozen part and the known appended bytes. Bytes appended by later versions are
+    /// ignored; bytes that an earlier version did not have may be missing.
     ///
     /// # Errors
     /// [`Mismatch::NotHello`] when it is too short, has another magic, or an unknown role.
@@ -175,10 +175,11 @@ impl Hello {
         })
     }
 
-    /// Whether `self` (ours) can talk to `theirs`, and in which minor.
+    /// Checks whether `self` (ours) is compatible with `theirs`, and returns the common minor
+    /// version.
     ///
     /// # Errors
-    /// A [`Mismatch`] that names both versions.
+    /// The [`Mismatch`]; for versions and schemas it contains both values.
     pub fn check(&self, theirs: &Self) -> Result<u16, Mismatch> {
         if self.role == theirs.role {
             return Err(Mismatch::Role);

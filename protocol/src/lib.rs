@@ -1,14 +1,16 @@
-//! The contract between the rig's controller and its host.
+//! The protocol between the rig's controller and its host.
 //!
-//! Everything that crosses the link is a *frame*: one kind byte, a payload, a CRC-32, wrapped in
-//! COBS and ended by a zero byte ([`frame`]), or behind its length where a link keeps packets apart ([`packet`]). Three layouts are fixed, little-endian and written by
-//! hand because they are hot or must never change: [`hello::Hello`] (frozen for ever),
-//! [`block::Block`] (samples) and [`acknowledge::Acknowledge`]. All else is postcard:
+//! Everything on the link is a *frame*: one kind byte, a payload and a CRC-32, COBS-encoded and
+//! terminated by a zero byte ([`frame`]), or preceded by its length where a link preserves packet
+//! boundaries ([`packet`]). Three layouts are fixed, little-endian and hand-written, because they
+//! are performance-critical or must never change: [`hello::Hello`] (permanently frozen),
+//! [`block::Block`] (samples) and [`acknowledge::Acknowledge`]. All others use postcard:
 //! [`request::Request`], [`answer::Answer`], [`event::Event`].
 //!
-//! The crate is `no_std`, never allocates and never panics on any input. It knows nothing of rigs,
-//! boards or files. Whatever changes the meaning of a byte changes [`schema::HASH`], and two ends
-//! whose hashes differ refuse each other by name ([`hello::Hello::check`]).
+//! The crate is `no_std`, never allocates and never panics on any input. It does not depend on
+//! rigs, boards or files. Any change in the meaning of a byte changes [`schema::HASH`]. Two ends
+//! with the same version and different hashes refuse each other and name both versions
+//! ([`hello::Hello::check`]).
 #![no_std]
 #![forbid(unsafe_code)]
 

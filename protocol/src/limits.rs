@@ -1,9 +1,10 @@
-//! The sizes and bounds that both ends agree on. Each enters the schema hash.
+//! The sizes and bounds that both ends agree on. Each is part of the schema hash.
 
-/// Most channels in one scan: two simultaneous-sampling converters of eight.
+/// Most channels in one scan: two simultaneous-sampling converters with eight channels each.
 pub const MAX_CHANNELS: usize = 16;
 
-/// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits each.
+/// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits
+/// each.
 pub const BLOCK_SAMPLE_BYTES: usize = 480;
 
 /// Bytes of a block's fixed header, its kind byte included.
@@ -15,20 +16,21 @@ pub const HELLO_BYTES: usize = 32;
 /// Bytes of the CRC-32 that ends every frame.
 pub const CRC_BYTES: usize = 4;
 
-/// Longest frame before COBS: kind, payload, CRC. A full sample block is exactly this long.
+/// Longest frame before COBS: kind, payload, CRC. A full sample block has exactly this length.
 pub const MAX_FRAME: usize = BLOCK_HEADER_BYTES + BLOCK_SAMPLE_BYTES + CRC_BYTES;
 
-/// Longest frame on the wire: COBS adds a byte per started 254, the delimiter one more.
-/// 503 < 512, so that one frame is one short high-speed bulk packet and never needs a zero-length one.
+/// Longest frame on the wire: COBS adds one byte per 254 bytes or part thereof, and the delimiter
+/// one more. 503 < 512, so that one frame is one short high-speed bulk packet and never needs a
+/// zero-length packet after it.
 pub const MAX_WIRE: usize = MAX_FRAME + MAX_FRAME.div_ceil(254) + 1;
 
-/// Bytes before a frame that goes as a packet ([`crate::packet`]).
+/// Bytes before a frame that is sent as a packet ([`crate::packet`]).
 pub const HEAD_BYTES: usize = 4;
 
-/// A packet is a whole number of these.
+/// The length of a packet is a multiple of this many bytes.
 pub const WORD: usize = 4;
 
-/// Longest packet: 504 < 512, so that it is one short high-speed bulk packet too.
+/// Longest packet: 504 < 512, so that it is also one short high-speed bulk packet.
 pub const MAX_PACKET: usize = HEAD_BYTES + MAX_FRAME;
 
 /// Longest name of a channel, point or board, in bytes of UTF-8.
@@ -40,31 +42,33 @@ pub const SENTENCE_BYTES: usize = 120;
 /// Longest coil pulse that any firmware may accept, in µs. A board's own cap may only be shorter.
 pub const COIL_PULSE_CAP_US: u32 = 8_000;
 
-/// Longest time for which one arming holds, in ms.
+/// Longest validity of one arming, in ms.
 pub const ARM_VALID_CAP_MS: u32 = 60_000;
 
-/// A front end that delivers nothing for this long has failed: hammer and shaker come to rest (ms of the
-/// device's time).
+/// A front end that delivers nothing for this long has failed: hammer and shaker come to rest (ms
+/// of the device's time).
 pub const SCAN_SILENCE_MS: u32 = 100;
 
-/// Longest time for which one order keeps the shaker running, in ms: a host that wants more renews it.
+/// Longest validity of one shaker request, in ms; a host that needs more time renews the request.
 pub const SHAKE_VALID_CAP_MS: u32 = 60_000;
 
-/// Shortest time in which the shaker's drive may go from rest to its full scale, in ms; every stop that is
-/// not an emergency takes the same slope down.
+/// Shortest time in which the shaker's drive may ramp from rest to full scale, in ms. Every stop
+/// that is not an emergency ramps down at the same slope.
 pub const SHAKE_RAMP_MS: u32 = 50;
 
-/// The shaker's highest frequency, as a part of the scan rate: so many scans make one cycle at least.
+/// The shaker's highest frequency, given as the smallest number of scans per cycle.
 pub const SHAKE_SCANS_PER_CYCLE: u32 = 10;
 
-/// By how much a session's scale may differ from the one that a device was built with, as a factor: all ranges that a vibrometer's
-/// decoder or an amplifier's knob has lie within it, and a slip between V and mV does not.
+/// Largest factor by which a session's scale may differ from the built-in scale. All ranges of a
+/// vibrometer's decoder or an amplifier's range switch lie within it; confusing V with mV does not.
 pub const SCALE_FACTOR_CAP: u32 = 100;
 
-/// A host that has not been heard for this long is gone: the hammer disarms (ms of the device's time).
+/// A host from which nothing was received for this long is considered gone: the hammer disarms and
+/// the shaker comes to rest (ms of the device's time).
 pub const LINK_SILENCE_MS: u32 = 1_000;
 
-/// Scans that fit one block of `channels` channels of 16 bits; `None` when there are none or too many.
+/// Scans that fit one block of `channels` 16-bit channels; `None` when there are no channels or too
+/// many.
 #[must_use]
 pub const fn scans_per_block(channels: usize) -> Option<usize> {
     if channels == 0 || channels > MAX_CHANNELS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }

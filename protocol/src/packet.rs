@@ -1,18 +1,20 @@
-//! Packets: the frames of a link that keeps packets apart, as USB's bulk endpoints do.
+//! Packets: the frame format on a link that preserves packet boundaries, such as USB bulk
+//! endpoints.
 //!
 //! | offset | bytes | field |
 //! |---|---|---|
 //! | 0 | 2 | length of kind, payload and CRC |
 //! | 2 | 2 | its complement |
 //! | 4 | … | kind, payload, CRC-32: as in [`crate::frame`], without COBS |
-//! | … | 0 to 3 | zeros to a whole number of words, in which they are copied |
+//! | … | 0 to 3 | zero padding to a whole number of words, for copying by words |
 //!
-//! Only a device sends them, and only to a host that said in its Hello that it reads them; Hellos themselves and whatever a
-//! host sends are COBS always. [`Reader`] is a host's reader: it takes either, and goes over to packets with the Hello
-//! that says so.
+//! Only a device sends packets, and only to a host whose Hello states that it can read them. Hellos
+//! and everything that a host sends are always COBS-encoded. [`Reader`] is the host's reader: it
+//! reads both formats, and switches to packets after the device's Hello that announces them.
 //!
-//! A packet that was damaged or lost on the way is found out by its head or its CRC. The reader then moves on byte by byte
-//! until a head is followed by a frame whose CRC is right; samples that look like a head cost it time, never a frame.
+//! A damaged or lost packet is detected by its head or its CRC. The reader then advances byte by
+//! byte until a head is followed by a frame with a correct CRC. Samples that look like a head cost
+//! time but never a frame.
 
 use crate::frame::{Accumulator, Frame, FrameError, Kind, head};
 use crate::hello::{Hello, Role};
@@ -21,11 +23,12 @@ use crate::limits::{CRC_BYTES, HEAD_BYTES, MAX_FRAME, MAX_PACKET, WORD};
 /// Shortest frame: kind and CRC.
 const SHORTEST: usize = 1 + CRC_BYTES;
 
-/// Finds frames in what a device sends, in COBS and, once its Hello has said so, as packets.
+/// Finds frames in the data of a device: in COBS, and as packets after its Hello has announced
+/// them.
 pub struct Reader {
     stuffed: Accumulator,
     packets: Packets,
-    /// The device's Hello has said that packets follow.
+    /// The device's Hello has announced packets.
     agreed: bool,
 }
 
@@ -36,15 +39,16 @@ impl Default for Reader {
 }
 
 impl Reader {
-    /// Expects COBS.
+    /// A reader that expects COBS.
     #[must_use]
     pub const fn new() -> Self {
         Self { stuffed: Accumulator::new(), packets: Packets::new(), agreed: false }
     }
 
-    /// Takes some bytes; how many, and the frame that they complete, or why what stood before them is none. Call again with
-    /// the rest, and once more with nothing after a result that left nothing: at least one byte is taken when `input` is
-    /// not empty, and no frame is left when nothing is taken and nothing found.
+    /// Consumes some bytes. Returns their number, and the frame that they complete or the reason
+    /// why the preceding bytes are not a frame. Call again with the rest, and once more with empty
+    /// input after a result that left no input. At least one byte is consumed when `input` is not
+    /// empty; no frame is pending when nothing is consumed and nothing found.
     pub fn feed(&mut self, input: &[u8]) -> (usize, Option<Result<Frame<'_>, FrameError>>) {
         if self.agreed {
             return self.packets.feed(input);
@@ -60,14 +64,14 @@ impl Reader {
     }
 }
 
-/// Finds packets in a stream of any bytes.
+/// Finds packets in an arbitrary byte stream.
 struct Packets {
     bytes: [u8; MAX_PACKET],
-    /// Bytes gathered.
+    /// Bytes in the buffer.
     used: usize,
-    /// Bytes at the front that were handed out.
+    /// Bytes at the front that have been returned to the caller.
     taken: usize,
-    /// Out of step, and that was said.
+    /// Synchronisation is lost, and this has been reported.
     lost: bool,
 }
 
@@ -81,7 +85,8 @@ impl Packets {
         loop {
             let taken = core::mem::take(&mut self.taken);
             self.drop_front(taken);
-            // to the end of the packet in hand and no farther, so that what is gathered begins with a head
+            // gather up to the end of the current packet and no further, so that the buffer begins
+            // with a head
             let wanted = match self.length() {
                 None => HEAD_BYTES,
                 Some(Ok(length)) => HEAD_BYTES + length.next_multiple_of(WORD),
@@ -111,7 +116,7 @@ impl Packets {
                 (self.taken, self.lost) = (wanted, false);
                 return (fed, Some(Frame::from_plain(&self.bytes[plain])));
             }
-            // this may have been no head at all
+            // the head may have been sample data: drop only its first byte
             self.taken = 1;
             if !core::mem::replace(&mut self.lost, true) {
                 return (fed, Some(Err(FrameError::Crc)));
@@ -119,7 +124,8 @@ impl Packets {
         }
     }
 
-    /// The length that the gathered head says; `None` while it is not whole, `Err` when it is no head.
+    /// The length in the gathered head; `None` while the head is incomplete, `Err` when the bytes
+    /// are not a head.
     fn length(&self) -> Option<Result<usize, ()>> {
         let head_bytes = self.bytes[..self.used].first_chunk::<HEAD_BYTES>()?;
         let length = usize::from(u16::from_le_bytes([head_bytes[0], head_bytes[1]]));
@@ -157,7 +163,7 @@ mod tests {
         writer.seal_packet(payload.len()).expect("fits").to_vec()
     }
 
-    /// What a reader finds in pieces of `step` bytes: payloads, and how often it was out of step.
+    /// Reads `bytes` in pieces of `step`; returns the payloads and the number of errors.
     fn found(bytes: &[u8], step: usize) -> (Vec<Vec<u8>>, usize) {
         let mut reader = Reader::new();
         let (mut payloads, mut bad) = (Vec::new(), 0);
@@ -198,7 +204,8 @@ mod tests {
             prop_assert_eq!(&read[1..], &payloads[..]);
         }
 
-        /// Codes of small noise look like heads; what is damaged or lost among them costs its own packets and no other.
+        /// Codes of small noise look like heads. Damage or loss costs only the affected packets and
+        /// no others.
         #[test]
         fn after_damage_the_reader_is_back_in_step(
             codes in prop::collection::vec(-300_i16..300, 240),
@@ -214,7 +221,7 @@ mod tests {
             bytes[at] ^= 0x10;
             bytes.splice(0..0, hello());
             let (read, bad) = found(&bytes, step);
-            // the range touches at most three of six packets
+            // the damaged range overlaps at most three of six packets
             prop_assert!(read.len() > 3, "{} of 6 were read", read.len() - 1);
             prop_assert!(read[1..].iter().all(|read| *read == payload));
             prop_assert!(bad <= 4);

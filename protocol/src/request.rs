@@ -1,5 +1,6 @@
-//! What a host may ask. Every request has a number; a repeated number is answered from memory and does
-//! nothing twice, and every actuator request is bounded before it is accepted.
+//! Requests of the host. Every request has a number; a repeated number is answered from stored
+//! replies without acting again, and every actuator request is checked against its bounds before it
+//! is accepted.
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -14,51 +15,52 @@ use crate::sync::Clock;
 pub struct Numbered {
     /// The request's number within the session.
     pub number: u32,
-    /// What is asked.
+    /// The request.
     pub request: Request,
 }
 
 impl Numbered {
-    /// Reads a frame's payload. Not generic, so that its code is this crate's and not each caller's.
+    /// Decodes a frame's payload. Not generic, so that its code is compiled in this crate and not
+    /// once per caller.
     ///
     /// # Errors
-    /// [`Unreadable`], with the number where that can be read: postcard writes it first.
+    /// [`Unreadable`], with the number if that is readable: postcard writes it first.
     pub fn read(payload: &[u8]) -> Result<Self, Unreadable> {
         postcard::from_bytes(payload)
             .map_err(|_| Unreadable(postcard::take_from_bytes(payload).ok().map(|(number, _)| number)))
     }
 }
 
-/// A request of which at most the number can be read.
+/// A request of which at most the number could be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable(pub Option<u32>);
 
-/// What is asked. Variants only ever grow at the end.
+/// What is requested. New variants are only ever added at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Request {
-    /// Who are you? → [`crate::answer::Answer::Info`]
+    /// Identity and properties of the device. → [`crate::answer::Answer::Info`]
     Info,
     /// Describe one channel. → [`crate::answer::Answer::Channel`]
     Channel {
-        /// Place in the scan, from 0.
+        /// Index in the scan, from 0.
         index: u8,
     },
-    /// How are you? → [`crate::answer::Answer::Status`]
+    /// State of the device. → [`crate::answer::Answer::Status`]
     Status,
     /// Begin a new stream of sample blocks. → [`crate::answer::Answer::Started`]
     Start,
-    /// End the stream; the ring keeps what it has. → [`crate::answer::Answer::Done`]
+    /// End the stream; the ring keeps its content. → [`crate::answer::Answer::Done`]
     Stop,
-    /// Send blocks again that hold these scans. → [`crate::answer::Answer::Resending`]
+    /// Retransmit the blocks that contain these scans. → [`crate::answer::Answer::Resending`]
     Resend {
-        /// Which stream.
+        /// Session epoch of the stream.
         epoch: u32,
-        /// First scan wanted.
+        /// First scan requested.
         first_scan: u64,
-        /// How many.
+        /// Number of scans.
         scans: u32,
     },
-    /// How the force pulse is recognised. → [`crate::answer::Answer::Done`]
+    /// Set how the force pulse is recognised. → [`crate::answer::Answer::Done`]
     Trigger(Trigger),
     /// The load cells' calibration matrix, row-major: forces (N) = matrix × readings (N). → `Done`
     LoadCells {
@@ -70,72 +72,81 @@ pub enum Request {
         /// At most [`crate::limits::ARM_VALID_CAP_MS`].
         valid_ms: u32,
     },
-    /// Take back arming and any shot whose coil is not on yet. → `Done`
+    /// Cancel the arming and any shot whose coil is not on yet. → `Done`
     Disarm,
-    /// One shot. → [`crate::answer::Answer::Scheduled`]
+    /// Fire one shot. → [`crate::answer::Answer::Scheduled`]
     Fire(Fire),
-    /// Where hammer and laser are (virtual rigs only). → [`crate::answer::Answer::Staged`]
+    /// Set the positions of hammer and laser (virtual rigs only). →
+    /// [`crate::answer::Answer::Staged`]
     Stage(Stage),
-    /// Stop everything that moves; only a local action at the rig re-arms. → `Done`
+    /// Emergency stop: stop everything that moves; only a local action at the rig re-arms. → `Done`
     EmergencyStop,
-    /// A sine from the shaker, for a bounded time; while it runs, another amplitude, frequency or time. → `Done`
+    /// Run the shaker with a sine for a bounded time; while it runs, change amplitude, frequency or
+    /// time. → `Done`
     Shake(Shake),
-    /// Bring the shaker to rest, over a ramp. → `Done`
+    /// Bring the shaker to rest over a ramp. → `Done`
     Rest,
-    /// By which scales the device judges trigger, quiet, limits and amplitudes in this session, instead of those that it was built
-    /// with. What it says of its channels ([`Request::Channel`]) stays, and so do the samples. → `Done`
+    /// Set the scales with which the device evaluates trigger, quiet, limits and amplitudes in this
+    /// session, instead of the built-in ones. The channel descriptions ([`Request::Channel`]) and
+    /// the samples are unaffected. → `Done`
     ///
-    /// Refused while the hammer is armed or the shaker moves. Forgotten when the session ends. Since protocol 1.1.
+    /// Refused while the hammer is armed or the shaker moves. Reset when the session ends. Since
+    /// protocol 1.1.
     Scales {
-        /// SI units per volt, sign included, of every channel in order; each not zero, and within a factor of
-        /// [`crate::limits::SCALE_FACTOR_CAP`] of what it was built with.
+        /// SI units per volt, sign included, of every channel in order; each nonzero, and within a
+        /// factor of [`crate::limits::SCALE_FACTOR_CAP`] of the built-in value.
         units_per_volt: Vec<f32, MAX_CHANNELS>,
     },
-    /// Temperature and sensor supplies as they were measured last. → [`crate::answer::Answer::Slow`]. Since protocol 1.1.
+    /// Last measured temperature and sensor supplies. → [`crate::answer::Answer::Slow`]. Since
+    /// protocol 1.1.
     Slow,
-    /// What is to time the scans. It is measured before anything can be started by it: ask [`Request::Sync`] until its fault is not
-    /// [`crate::sync::ClockFault::Unproven`] any more. → `Done`
+    /// Select the clock that times the scans. It is measured before anything can be started with
+    /// it: send [`Request::Sync`] until its fault is no longer
+    /// [`crate::sync::ClockFault::Unproven`]. → `Done`
     ///
-    /// Refused while a stream runs. Forgotten when the session ends. Since protocol 1.2.
+    /// Refused while a stream runs. Reset when the session ends. Since protocol 1.2.
     Clock(Clock),
-    /// Clock and edges as they are now. → [`crate::answer::Answer::Sync`]. Since protocol 1.2.
+    /// Present state of clock and edges. → [`crate::answer::Answer::Sync`]. Since protocol 1.2.
     Sync,
-    /// One pulse of the sync output, as soon as it can be; its instant comes as [`crate::event::Event::Edge`]. → `Done`. Since protocol 1.2.
+    /// Emit one pulse at the sync output as soon as possible; its instant is reported as
+    /// [`crate::event::Event::Edge`]. → `Done`. Since protocol 1.2.
     Mark,
 }
 
 /// How the force pulse is recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Trigger {
-    /// Force that counts as contact, N.
+    /// Force above which contact is recognised, N.
     pub level_n: f32,
-    /// How long to wait for contact after the coil goes off, scans.
+    /// How long to wait for contact after the coil is switched off, scans.
     pub flight_scans: u32,
     /// How long to watch for rebounds after the trigger, scans.
     pub listen_scans: u32,
-    /// How long the hammer rests after a shot, scans.
+    /// How long the hammer is held off after a shot, scans.
     pub hold_off_scans: u32,
 }
 
 /// One shot of the hammer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Fire {
-    /// The host's number for it, larger than any before in this session.
+    /// The host's shot number, larger than any before in this session.
     pub number: u32,
-    /// Coil pulse, µs; refused when over the board's cap.
+    /// Coil pulse, µs; refused when it exceeds the board's cap.
     pub pulse_us: u32,
     /// The coil stays off before this scan.
     pub not_before: u64,
-    /// Residual motion allowed in the quiet window, one limit per channel in the channel's unit (rms);
-    /// 0 leaves a channel out. See [`Fire::quiet_window`].
+    /// Residual motion allowed in the quiet window, one limit per channel in the channel's unit
+    /// (rms); 0 excludes a channel. See [`Fire::quiet_window`].
     pub quiet_limits: Vec<f32, MAX_CHANNELS>,
-    /// Length of the windows in which residual motion is judged, in decimated samples (0: not judged).
+    /// Length of the windows in which residual motion is evaluated, in decimated samples (0: not
+    /// evaluated).
     pub quiet_window: u16,
-    /// Give up when the structure is not quiet after this many scans from `not_before`.
+    /// The shot is abandoned when the structure is not quiet within this many scans from
+    /// `not_before`.
     pub quiet_patience: u32,
 }
 
-/// What the shaker's order holds constant.
+/// The quantity that a shaker request holds constant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Control {
     /// The drive itself.
@@ -145,7 +156,7 @@ pub enum Control {
         /// Amplitude, m.
         amplitude_m: f32,
     },
-    /// The excitation's force.
+    /// The excitation force.
     Force {
         /// Amplitude, N.
         amplitude_n: f32,
@@ -155,26 +166,29 @@ pub enum Control {
 /// A sine from the shaker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Shake {
-    /// Turn per scan, in parts of 2³²: frequency × 2³² / scan rate. So the frequency is exact to the scans'
-    /// clock, and a change of it keeps the phase.
+    /// Phase increment per scan, in units of 2⁻³² turn: frequency × 2³² / scan rate. The frequency
+    /// is thus exact relative to the scan clock, and a change of frequency keeps the phase
+    /// continuous.
     pub step: u32,
-    /// What has which amplitude.
+    /// The controlled quantity and its amplitude.
     pub control: Control,
-    /// The drive's amplitude, V, and when something else is controlled the drive's largest; refused when over the
-    /// board's full scale.
+    /// Amplitude of the drive, V; when another quantity is controlled, the largest amplitude of the
+    /// drive. Refused when it exceeds the board's full scale.
     pub amplitude_v: f32,
-    /// How fast the amplitude goes there, V/s; refused when faster than full scale in
+    /// Slew rate of the amplitude, V/s; refused when faster than full scale in
     /// [`crate::limits::SHAKE_RAMP_MS`].
     pub slew_v_per_s: f32,
-    /// How long it holds, ms: at most [`crate::limits::SHAKE_VALID_CAP_MS`]. Then the shaker comes to rest, over
-    /// a ramp, unless it was ordered anew.
+    /// Validity, ms: at most [`crate::limits::SHAKE_VALID_CAP_MS`]. Afterwards the shaker comes to
+    /// rest over a ramp, unless the request was renewed.
     pub valid_ms: u32,
-    /// Magnitudes that bring the shaker to rest, one per channel in the channel's unit; 0 leaves a channel out.
+    /// Magnitudes above which the shaker is brought to rest, one per channel in the channel's unit;
+    /// 0 excludes a channel.
     pub limits: Vec<f32, MAX_CHANNELS>,
 }
 
 impl Shake {
-    /// The turn per scan that makes `frequency_hz` at `scan_rate_hz`, to 2⁻³³ of a turn.
+    /// The phase increment per scan for `frequency_hz` at `scan_rate_hz`, rounded to within 2⁻³³ of
+    /// a turn.
     #[must_use]
     pub fn step_of(frequency_hz: f64, scan_rate_hz: u32) -> u32 {
         // a negative or too large frequency saturates, and the device refuses it
@@ -193,10 +207,10 @@ pub enum Configuration {
     Ajb,
 }
 
-/// Where hammer and laser are.
+/// Positions of hammer and laser.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Stage {
-    /// Which structure hangs in the rig.
+    /// Which structure is mounted in the rig.
     pub configuration: Configuration,
     /// Name of the impact point.
     pub impact: Name,

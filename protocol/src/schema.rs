@@ -1,19 +1,20 @@
-//! The version of the contract, and the hash that tells two builds of it apart.
+//! The version of the protocol, and the hash that distinguishes two builds of it.
 //!
-//! `postcard-schema` sees types, fields and variants, but neither the capacity of a string or vector nor
-//! the hand-written layouts; those enter by hand through [`LAYOUT`].
+//! `postcard-schema` covers types, fields and variants, but neither the capacity of a string or
+//! vector nor the hand-written layouts; [`LAYOUT`] adds these.
 
 use postcard_schema::key::Key;
 
 use crate::{acknowledge, answer, block, event, limits, request, slow, sync};
 
-/// Another major is another protocol.
+/// Major version; different majors are incompatible.
 pub const MAJOR: u16 = 1;
 
-/// Minors add at the end of enumerations and structures.
+/// Minor version; a new minor only adds at the end of enumerations and structures.
 pub const MINOR: u16 = 2;
 
-/// Everything that gives bytes a meaning and that the types do not show. Change a layout, change this.
+/// Everything that determines the meaning of bytes and is not part of the types. Update this when a
+/// layout changes.
 pub const LAYOUT: &[u64] = &[
     limits::MAX_CHANNELS as u64,
     limits::BLOCK_SAMPLE_BYTES as u64,
@@ -35,11 +36,12 @@ pub const LAYOUT: &[u64] = &[
     acknowledge::BYTES as u64,
     block::HEADER_PAYLOAD as u64,
     limits::HEAD_BYTES as u64,
-    // revision of the hand-written layouts in `block`, `acknowledge`, `frame`, `packet` and behind the frozen part of `hello`
+    // revision of the hand-written layouts in `block`, `acknowledge`, `frame`, `packet` and of the
+    // bytes after the frozen part of `hello`
     2,
 ];
 
-/// Hash of all of it.
+/// Hash of the types and [`LAYOUT`].
 pub const HASH: u64 = {
     let mut hash = 0xcbf2_9ce4_8422_2325;
     hash = mix(hash, u64::from_le_bytes(Key::for_path::<request::Numbered>("request").to_bytes()));

@@ -1,4 +1,5 @@
-//! What changes slowly and is in no scan: the specimen's temperature, and the bias of sensors that are fed with a constant current.
+//! Slowly changing values that are not part of the scans: the specimen's temperature, and the bias
+//! of sensors fed with a constant current.
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -7,34 +8,35 @@ use serde::{Deserialize, Serialize};
 /// Most inputs of a board that feed a sensor with a constant current (IEPE).
 pub const MAX_SUPPLIES: usize = 2;
 
-/// Below this bias a supply works into a short, V: an IEPE sensor's amplifier stands at 8 to 14 V, and none below 5 V (not checked
-/// against each sensor's manual; the figures are those that such sensors have in common).
+/// Bias below which a supply is considered shorted, V: the amplifier of an IEPE sensor is biased at
+/// 8 to 14 V, and never below 5 V (typical values of such sensors, not checked against each
+/// sensor's manual).
 pub const SHORT_BELOW_V: f32 = 3.0;
 
-/// Above this bias a supply of 24 V finds nothing to feed, V: without a current it stands at 22 V or more, and a sensor that is at the
-/// end of its range swings to 19 V (14 V of bias and 5 V of signal).
+/// Bias above which a 24 V supply is considered open, V: without a load current it is at 22 V or
+/// more, and a sensor at the end of its range swings to 19 V (14 V of bias and 5 V of signal).
 pub const OPEN_ABOVE_V: f32 = 20.0;
 
-/// Slow values as they were measured last.
+/// Last measured slow values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Slow {
-    /// Temperature at the specimen, °C; none without a sensor.
+    /// Temperature at the specimen, °C; `None` without a sensor.
     pub temperature_c: Option<f32>,
     /// Every constant-current supply of the board.
     pub supplies: Vec<Supply, MAX_SUPPLIES>,
 }
 
-/// A constant-current supply, and what it feeds.
+/// A constant-current supply and the state of its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Supply {
-    /// The channel behind it: its place in the scan.
+    /// The channel that it feeds: its index in the scan.
     pub channel: u8,
     /// Mean voltage at its socket, V.
     pub bias_v: f32,
 }
 
 impl Supply {
-    /// What is wrong with what it feeds, if anything.
+    /// The fault that the bias indicates, if any.
     #[must_use]
     pub fn fault(&self) -> Option<SupplyFault> {
         if self.bias_v > OPEN_ABOVE_V {
@@ -42,19 +44,19 @@ impl Supply {
         } else if self.bias_v >= SHORT_BELOW_V {
             None
         } else {
-            // what is no number is no sensor either
+            // NaN also counts as a missing sensor
             Some(SupplyFault::Short)
         }
     }
 }
 
-/// What a supply finds instead of a sensor.
+/// Fault of a sensor that a supply detects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SupplyFault {
-    /// No current flows: the cable is open, or nothing is plugged in.
+    /// No current flows: the cable is open, or nothing is connected.
     Open,
-    /// No voltage stands: the cable or the sensor is shorted.
+    /// There is no voltage: the cable or the sensor is shorted.
     Short,
 }
 

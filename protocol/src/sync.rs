@@ -1,16 +1,18 @@
-//! Sync: in step with another recorder, by its clock or by edges that both see.
+//! Synchronisation with another recorder, by its clock or by edges that both record.
 //!
-//! Every instant is told in scans, which are the only clock for results: an edge that another recorder also sees has a scan index here and
-//! a time there, and two such edges tie the two clocks together.
+//! Every instant is expressed in scans, which are the only time base for results. An edge that
+//! another recorder also records has a scan index here and a time there; two such edges relate the
+//! two clocks.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// By how much an external clock may differ from its nominal rate, as the controller's own crystal measures it, in parts of a million: crystals
-/// of recorders are good to 50, and the controller's adds its own 50.
+/// Largest allowed deviation of an external clock from its nominal rate, in ppm, measured against
+/// the controller's crystal: crystals of recorders are accurate to 50 ppm, and the controller's own
+/// adds another 50 ppm.
 pub const CLOCK_TOLERANCE_PPM: u32 = 200;
 
-/// What times the scans.
+/// The clock that times the scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Clock {
@@ -19,22 +21,23 @@ pub enum Clock {
     Internal,
     /// The clock input: one rising edge for each scan.
     External {
-        /// Its nominal rate, Hz: that of the scans.
+        /// Its nominal rate, Hz; equal to the scan rate.
         rate_hz: u32,
     },
 }
 
-/// What is wrong with the external clock.
+/// Fault of the external clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ClockFault {
     /// It is still being measured.
     Unproven,
-    /// No edges come to the input.
+    /// No edges arrive at the input.
     Absent,
-    /// Edges come, and their rate is more than [`CLOCK_TOLERANCE_PPM`] away from the nominal one.
+    /// Edges arrive, but their rate deviates from the nominal one by more than
+    /// [`CLOCK_TOLERANCE_PPM`].
     Rate,
-    /// It was good, and stopped or left the tolerance while it timed the scans.
+    /// It was good, then stopped or left the tolerance while it timed the scans.
     Lost,
 }
 
@@ -63,21 +66,21 @@ impl core::fmt::Display for ClockFault {
 /// An instant, in scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Moment {
-    /// The last scan that was taken at it or before it.
+    /// The last scan taken at or before the instant.
     pub scan: u64,
-    /// The part of a scan that had passed since, in parts of 2¹⁶.
+    /// Fraction of a scan that had passed since then, in units of 2⁻¹⁶.
     pub part: u16,
 }
 
 impl Moment {
-    /// In scans; exact up to scan 2³⁷ (a month at 51.2 kHz).
+    /// The instant in scans; exact up to scan 2³⁷ (a month at 51.2 kHz).
     #[must_use]
     pub fn scans(&self) -> f64 {
         self.scan as f64 + f64::from(self.part) / 65_536.0
     }
 }
 
-/// Which edge.
+/// Source of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Line {
@@ -85,7 +88,7 @@ pub enum Line {
     Input,
     /// The sync output rose because the hammer's coil was switched on.
     Fired,
-    /// The sync output rose because the hammer's force passed the trigger's level.
+    /// The sync output rose because the hammer's force exceeded the trigger level.
     Trigger,
     /// The sync output rose because the host asked for it.
     Asked,
@@ -94,27 +97,31 @@ pub enum Line {
 /// An edge at the sync input or output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Edge {
-    /// Which.
+    /// Source of the edge.
     pub line: Line,
-    /// Its number since the device started, from 1: edges of the input that came too fast to be told count too, and pulses of the
-    /// output are counted apart. A jump tells what is missing.
+    /// Its number since the device started, from 1. Edges of the input that came too fast to be
+    /// resolved are counted too; pulses of the output are counted separately. A jump shows how many
+    /// are missing.
     pub number: u32,
-    /// When.
+    /// Its instant.
     pub at: Moment,
 }
 
-/// Clock and edges as they are now.
+/// Present state of clock and edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Sync {
-    /// What times the scans.
+    /// The clock that times the scans.
     pub clock: Clock,
-    /// What is wrong with the external clock that was asked for last; nothing can be started until a clock is asked for anew.
+    /// Fault of the external clock that was requested last; nothing can be started until a clock is
+    /// requested again.
     pub fault: Option<ClockFault>,
-    /// How much faster the external clock is than the controller's crystal says, in parts of a million; 0 with the internal one.
+    /// Relative deviation of the external clock from the controller's crystal, in ppm, positive
+    /// when faster; 0 with the internal clock.
     pub ppm: f32,
     /// Edges at the input since the device started.
     pub edges: u32,
-    /// Those of them that came too fast after another to be told. At least so many: the hardware says that there were some, not how many.
+    /// Edges among these that followed another edge too fast to be resolved. A lower bound: the
+    /// hardware reports that there were some, not how many.
     pub edges_lost: u32,
     /// Pulses of the output since the device started.
     pub pulses: u32,

@@ -1,4 +1,4 @@
-//! Lets the boards name `build-id.x` when they link.
+//! Makes `build-id.x` available to the boards' linking.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

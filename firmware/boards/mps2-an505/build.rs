@@ -1,4 +1,5 @@
-//! Linking: the memory map beside this file, cortex-m-rt's script, the log strings' and the build id's.
+//! Linking: the memory map in this folder, and the scripts of cortex-m-rt, the log strings and the
+//! build id.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -1,4 +1,5 @@
-//! Linker scripts: start-up, log strings, and the build id by which a host finds the table of these strings.
+//! Linker scripts: start-up, log strings, and the build id by which a host finds the table of these
+//! strings.
 
 fn main() {
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x", "-Tbuild-id.x", "--build-id=sha1"] {

@@ -1,4 +1,4 @@
-//! An image of a few strings, and lines as a controller encodes them: for tests.
+//! For tests: an image with a few log strings, and lines encoded as by a controller.
 
 use object::write::{Object, Symbol, SymbolSection};
 use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
@@ -7,13 +7,13 @@ use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, S
 pub const WARNING: u16 = 1;
 /// `"shot {=u32} of {=str}"`, at level info.
 pub const SHOT: u16 = 2;
-/// What [`SHOT`] and [`WARNING`] are preceded by: microseconds since the start.
+/// Prefix of [`SHOT`] and [`WARNING`]: microseconds since the start.
 const TIMESTAMP: u16 = 3;
 
-/// An image with this build id, whose table holds the strings above.
+/// An image with this build id, whose table contains the strings above.
 ///
 /// # Panics
-/// When the writer of ELF files refuses it.
+/// When the ELF writer rejects it.
 pub fn image(build: u64) -> Vec<u8> {
     let mut object = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let mut note = [&4_u32.to_le_bytes()[..], &20_u32.to_le_bytes(), &3_u32.to_le_bytes(), b"GNU\0"].concat();
@@ -49,7 +49,8 @@ pub fn image(build: u64) -> Vec<u8> {
     object.write().expect("a well-formed image")
 }
 
-/// A line: the string's place, the time, the arguments, in rzCOBS with a zero at the end.
+/// An encoded line: the string's index, the time and the arguments, in rzCOBS with a terminating
+/// zero.
 pub fn line(string: u16, at_us: u64, arguments: &[u8]) -> Vec<u8> {
     let plain = [&string.to_le_bytes()[..], &at_us.to_le_bytes(), arguments].concat();
     let (mut out, mut run, mut zeros) = (Vec::new(), 0_u8, 0_u8);

@@ -1,10 +1,11 @@
-//! A controller's log lines: which image they came from, where its table of strings is kept, and what they say.
+//! A controller's log lines: identification of their image, storage of its string table, and
+//! decoding.
 //!
-//! A controller sends its log as numbers (defmt): the strings stay behind in the image's ELF file, in a table
-//! that fits this one build and no other. The linker writes a hash of the whole image into it
-//! (`.note.gnu.build-id`); its first eight bytes are the *build id*. The controller says it in `Info`, and
-//! a table is kept as [`FOLDER`]`/`[`file_name`]. So whoever has changed a line and flashed the result
-//! can never be shown the text of another build.
+//! A controller sends its log as numbers (defmt). The strings remain in the image's ELF file, in a
+//! table that matches only this build. The linker writes a hash of the whole image into the file
+//! (`.note.gnu.build-id`); its first eight bytes are the *build id*. The controller reports it in
+//! `Info`, and a table is stored as [`FOLDER`]`/`[`file_name`]. Therefore, after a change of a log
+//! line and flashing, text of another build can never be shown.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "example")]
@@ -22,15 +23,15 @@ use object::Object;
 pub use line::Line;
 pub use table::{Table, TableError};
 
-/// The folder of tables that `cargo xtask firmware` fills, inside cargo's target directory.
+/// The folder for tables filled by `cargo xtask firmware`, inside cargo's target directory.
 pub const FOLDER: &str = "log-tables";
 
-/// What the table of a build is called.
+/// File name of a build's table.
 pub fn file_name(build: u64) -> String {
     format!("{build:016x}.elf")
 }
 
-/// The build id of an image; `None` when these bytes are no ELF image or hold no id.
+/// The build id of an image; `None` when these bytes are not an ELF image or contain no id.
 pub fn build_id(image: &[u8]) -> Option<u64> {
     let file = object::File::parse(image).ok()?;
     let id = file.build_id().ok()??;

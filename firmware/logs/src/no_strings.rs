@@ -1,8 +1,8 @@
-//! In place of the decoder, where it was left out.
+//! Replacement for the decoder when it is disabled.
 
 use crate::line::Line;
 
-/// There are none.
+/// Never constructed.
 pub enum Strings {}
 
 impl Strings {

@@ -1,4 +1,4 @@
-//! The decoder proper: defmt's own.
+//! The decoder, based on defmt's.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -13,7 +13,8 @@ impl Strings {
     pub fn of_image(image: &[u8]) -> Result<Self, String> {
         let table = defmt_decoder::Table::parse(image).map_err(|error| error.to_string())?;
         let table = table.ok_or("it logs nothing")?;
-        // of such a slice defmt's decoder reserves as many places as four bytes say, damaged or not
+        // for such a slice, defmt's decoder reserves as many elements as a four-byte count
+        // specifies, even in damaged data
         if let Some(symbol) = table.raw_symbols().find(|symbol| symbol.contains("=[?]")) {
             return Err(format!(
                 "it logs slices of values, which damaged bytes would make endless: {symbol}"
@@ -22,9 +23,9 @@ impl Strings {
         Ok(Self(table))
     }
 
-    /// The line that these bytes encode, the zero at their end included.
+    /// Decodes one line; the bytes include the terminating zero.
     pub fn line(&self, encoded: &[u8]) -> Option<Line> {
-        // whatever a stranger's parser makes of damaged bytes must not end a campaign
+        // a panic of the third-party decoder on damaged bytes must not end a campaign
         let decoded = catch_unwind(AssertUnwindSafe(|| {
             let mut decoder = self.0.new_stream_decoder();
             decoder.received(encoded);

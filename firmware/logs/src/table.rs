@@ -1,4 +1,4 @@
-//! The table of one image, and the lines that it makes of bytes.
+//! The string table of one image, and decoding of bytes into lines.
 
 use std::path::{Path, PathBuf};
 
@@ -11,15 +11,15 @@ pub enum TableError {
     /// The file could not be read.
     #[error("{} cannot be read: {source}", path.display())]
     File {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         source: std::io::Error,
     },
-    /// It is not what a controller runs.
+    /// It is not a controller image with log strings.
     #[error("{} holds no table of log strings: {why}", path.display())]
     NoTable {
-        /// Which file.
+        /// The file.
         path: PathBuf,
         /// What is missing in it.
         why: String,
@@ -43,7 +43,7 @@ impl Table {
         Self::of_image(&image).map_err(|why| TableError::NoTable { path: path.to_path_buf(), why })
     }
 
-    /// Takes the table out of an image; says what is missing when it cannot.
+    /// Extracts the table from an image.
     ///
     /// # Errors
     /// A sentence: no ELF image, no build id, or no table.
@@ -52,13 +52,13 @@ impl Table {
         Ok(Self { build, strings: Strings::of_image(image)? })
     }
 
-    /// The build that it belongs to.
+    /// The build to which the table belongs.
     pub fn build(&self) -> u64 {
         self.build
     }
 
-    /// Hands every line in `bytes` to `each`. Each line ends with a zero byte, so that a damaged one costs
-    /// no other. Returns how many bytes made no line.
+    /// Passes every line in `bytes` to `each`. Each line ends with a zero byte, so that a damaged
+    /// line does not affect others. Returns the number of bytes that could not be decoded.
     pub fn lines(&self, bytes: &[u8], mut each: impl FnMut(Line)) -> usize {
         let mut lost = 0;
         for encoded in bytes.split_inclusive(|byte| *byte == 0).filter(|encoded| *encoded != [0]) {

@@ -1,4 +1,4 @@
-//! Lines from bytes, whole and damaged.
+//! Decoding of intact and damaged lines.
 #![cfg(feature = "decode")]
 
 use jointrig_logs::example::{SHOT, WARNING, image, line, shot};
@@ -46,7 +46,7 @@ fn what_is_missing_in_an_image_is_said() {
 }
 
 proptest! {
-    /// Whatever arrives, each byte is part of a line or counted, and nothing breaks.
+    /// For any input, each byte is part of a line or counted, and nothing panics.
     #[test]
     fn any_bytes_are_lines_or_counted(bytes in prop::collection::vec(any::<u8>(), 0..1_000)) {
         let (lines, lost) = read(&bytes);
@@ -56,7 +56,7 @@ proptest! {
         prop_assert!((lost == all) == lines.is_empty());
     }
 
-    /// A line with any of its bits flipped, between two whole ones.
+    /// A line with any of its bits flipped, between two intact ones.
     #[test]
     fn a_flipped_bit_leaves_the_neighbours_alone(at in 0..20_usize, bit in 0..8_u32) {
         let good = line(WARNING, 5, &6_u32.to_le_bytes());

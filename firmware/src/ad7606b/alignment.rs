@@ -1,55 +1,60 @@
-//! Whether what two chips sent is in step with the clock that made them convert, block by block, and exactly.
+//! Checks block by block whether the data of two chips are exactly aligned with the clock that
+//! starts their conversions.
 //!
-//! Each chip is read into a ring of its own by hardware, which begins when BUSY falls. A fall that was not seen leaves a chip one scan
-//! behind for good, a fall too many puts it ahead, a word that was lost tears its scans; no CRC tells the first two. So at
-//! one moment, after a block was copied, three things are read off: the count of the clock's periods with its phase, and how far
-//! either ring is filled. Away from the few µs of a read-out these must agree to the word. Then the block is proven: both rings hold
-//! exactly the scans that the clock says, and what was copied was complete and not yet overwritten.
+//! Hardware reads each chip into its own ring, starting when BUSY falls. A missed falling edge
+//! leaves a chip permanently one scan behind, an extra edge puts it ahead, and a lost word shifts
+//! the boundaries of its scans; no CRC detects the first two. Therefore three values are read at
+//! one moment after a block was copied: the count of clock periods, the phase within the period,
+//! and the fill level of both rings. Outside the few µs of a read-out, these must agree to the
+//! word. The block is then proven: both rings contain exactly the scans that the clock implies, and
+//! the copied block was complete and not yet overwritten.
 //!
-//! Nothing here counts interrupts, so that none can come late; and no block leaves before it is proven, so that a slip costs the
-//! block in hand and what went by since, and never a scan that was sent as good.
+//! Nothing here counts interrupts, so a late interrupt cannot cause an error. No block is passed on
+//! before it is proven, so a slip costs the current block and the scans since then, and no
+//! misaligned scan is ever sent as good.
 
 use jointrig_hot::pair::CHIP_BYTES;
 
 /// Words that a chip sends for one scan.
 pub const SCAN_WORDS: u32 = CHIP_BYTES as u32 / 2;
 
-/// A period of the clock, in counts of its timer.
+/// Timing within a period of the clock, in timer counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
-    /// From here on a period's count and its phase belong together: the counter of periods hears of a new one a few counts late.
+    /// From this count on, period count and phase are consistent: the period counter is incremented
+    /// a few counts late.
     pub settled: u32,
-    /// Before this no read-out of the period's scan begins.
+    /// The read-out of the period's scan never begins before this count.
     pub read_from: u32,
-    /// From here on it is over.
+    /// The read-out is complete from this count on.
     pub read_by: u32,
 }
 
-/// What was read off at one moment.
+/// Values read at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moment {
-    /// Periods that have begun since the rings' start, less one; it may wrap.
+    /// Periods begun since the rings were started, minus one; it may wrap.
     pub periods: u32,
-    /// The timer's count in the present one.
+    /// The timer's count within the present period.
     pub phase: u32,
-    /// How far either ring is filled, words from its beginning.
+    /// Fill position of each ring, in words from its beginning.
     pub words: [u32; 2],
 }
 
-/// What a moment says of a block.
+/// Verdict on a block at a given moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Complete, in step, and not overwritten.
+    /// Complete, aligned and not overwritten.
     Proven,
-    /// The chips may be being read: a few µs later it can be said.
+    /// The chips may be in a read-out: try again a few µs later.
     Again,
-    /// Words by which either ring is behind the clock; negative, ahead of it.
+    /// Words by which each ring is behind the clock; negative when ahead.
     Slipped([i32; 2]),
     /// The block may have been overwritten while it was copied.
     Late,
 }
 
-/// Two rings of so many blocks.
+/// Alignment check for two rings of the same size.
 #[derive(Clone, Copy, Debug)]
 pub struct Alignment {
     /// The clock.
@@ -61,7 +66,8 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// Judges block `number`, counted from the rings' start (it may wrap when `blocks` is a power of two).
+    /// Checks block `number`, counted from the start of the rings (it may wrap when `blocks` is a
+    /// power of two).
     #[must_use]
     pub fn judge(&self, number: u32, moment: &Moment) -> Verdict {
         let Clock { settled, read_from, read_by } = self.clock;
@@ -70,7 +76,7 @@ impl Alignment {
             phase if phase >= settled && phase < read_from => moment.periods,
             _ => return Verdict::Again,
         };
-        // scans that the clock says were read since the block began
+        // scans read since the block began, according to the clock
         let since = read.wrapping_sub(number.wrapping_mul(self.block_scans)).cast_signed();
         if i64::from(since) > i64::from((self.blocks - 1) * self.block_scans) {
             return Verdict::Late;
@@ -79,10 +85,11 @@ impl Alignment {
         let begin = (number % self.blocks * self.block_scans * SCAN_WORDS).cast_signed();
         let due = begin + since * SCAN_WORDS.cast_signed();
         let [first, second] = moment.words.map(u32::cast_signed);
-        // the usual case, without a division: a block is over before the next but six begins
+        // the usual case, without a division: `since` is less than the ring's length, so one
+        // subtraction is enough
         let place = if due >= ring { due - ring } else { due };
         if (first, second) == (place, place) {
-            // or in step, and told too early
+            // aligned, but possibly checked before the block was complete
             let whole = since >= self.block_scans.cast_signed();
             return if whole { Verdict::Proven } else { Verdict::Again };
         }

@@ -1,7 +1,8 @@
 //! One chip: reset, identity, settings, diagnostics, single conversions.
 //!
-//! A register access is two or three bytes at most, so it blocks for a few µs at set-up; only the end
-//! of a conversion is waited for, and never longer than [`BUSY_PATIENCE`] times the data sheet's longest.
+//! A register access takes two or three bytes, so it blocks for a few µs during set-up. Only the
+//! end of a conversion is awaited asynchronously, for at most [`BUSY_PATIENCE`] times the data
+//! sheet's longest conversion time.
 
 use embassy_futures::select::{Either, select};
 use embedded_hal::delay::DelayNs;
@@ -15,30 +16,32 @@ use super::part::{Lines, Oversampling, Part};
 use super::range::Range;
 use super::{CHANNELS, Error, registers as reg};
 
-/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, "Timing Specifications", tRESET.
+/// A RESET pulse of more than 3.2 µs is a full reset: AD7606B Rev. 0, "Timing Specifications",
+/// tRESET.
 const RESET_NS: u32 = 5_000;
 /// After a full reset the chip loads its own calibration: tDEVICE_SETUP is 253 µs.
 const SETUP_US: u32 = 300;
-/// CONVST must be low for 10 ns before it rises: tLP_CNV. A pin takes longer than that anyway.
+/// CONVST must be low for 10 ns before it rises: tLP_CNV. Switching a pin takes longer than that in
+/// any case.
 const CONVST_LOW_NS: u32 = 100;
-/// How many times the longest conversion BUSY may last before it is called stuck.
+/// Multiple of the longest conversion time after which BUSY is considered stuck.
 pub const BUSY_PATIENCE: u32 = 3;
-/// What is watched always: ROM, register map, addresses, BUSY.
+/// Diagnostics that are always enabled: ROM, register map, addresses, BUSY.
 const WATCHED: u8 =
     reg::ROM_CRC | reg::MEMORY_MAP_CRC | reg::SPI_WRITE | reg::SPI_READ | reg::BUSY_STUCK_HIGH;
 
-/// How the chip is to work.
+/// Configuration of the chip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Each channel's range.
+    /// Range of each channel.
     pub ranges: [Range; CHANNELS],
     /// Conversions averaged per sample.
     pub oversampling: Oversampling,
-    /// Lines in use.
+    /// DOUT lines in use.
     pub lines: Lines,
     /// Whether data and register frames carry a CRC.
     pub crc: bool,
-    /// Whether filters pass 220 kHz instead of 25 kHz, on parts that can.
+    /// Bandwidth of 220 kHz instead of 25 kHz for the filters, on parts that support it.
     pub wide_band: bool,
 }
 
@@ -54,36 +57,36 @@ impl Default for Settings {
     }
 }
 
-/// One chip in software mode (OS0…OS2 tied high), on a port of its own: `S` frames each access with CS, `R`
-/// is its RESET pin.
+/// One chip in software mode (OS0…OS2 tied high), on its own port: `S` frames each access with CS,
+/// `R` is its RESET pin.
 ///
-/// The port must be of mode 2 (clock idles high, data are taken on its falling edge): AD7606B Rev. 0,
-/// "Serial Interface".
+/// The port must use SPI mode 2 (clock idles high, data are sampled on its falling edge): AD7606B
+/// Rev. 0, "Serial Interface".
 #[derive(Debug)]
 pub struct Converter<S, R> {
     spi: S,
     reset: R,
     part: &'static Part,
     settings: Settings,
-    /// The port is in register mode.
+    /// The chip is in register mode.
     in_registers: bool,
     /// Register frames carry a CRC.
     crc: bool,
 }
 
-/// What a converter's methods return.
+/// Result type of a converter's methods.
 type Done<S, R, T = ()> = Result<
     T,
     Error<<S as embedded_hal::spi::ErrorType>::Error, <R as embedded_hal::digital::ErrorType>::Error>,
 >;
 
 impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
-    /// A chip that nothing is known of yet: [`Self::reset`] comes first.
+    /// A driver for a chip in unknown state; call [`Self::reset`] first.
     pub fn new(spi: S, reset: R, part: &'static Part) -> Self {
         Self { spi, reset, part, settings: Settings::default(), in_registers: false, crc: false }
     }
 
-    /// Gives port and pin back, with the chip in ADC mode, for a board that reads data by DMA.
+    /// Returns port and pin, with the chip in ADC mode, for a board that reads data by DMA.
     ///
     /// # Errors
     /// [`Error::Spi`].
@@ -92,8 +95,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok((self.spi, self.reset))
     }
 
-    /// Full reset: all registers have their first values again. Then checks that the chip was indeed reset,
-    /// and that it is the right one.
+    /// Full reset: all registers return to their default values. Then checks that the chip was
+    /// actually reset and that it is the expected part.
     ///
     /// # Errors
     /// [`Error::NotReset`], [`Error::Identity`], or the port's and pin's own.
@@ -104,7 +107,7 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         delay.delay_us(SETUP_US);
         self.in_registers = false;
         self.crc = false;
-        // the identity first: a chip that is not there has no status worth reading
+        // identity first: without a chip, the status is meaningless
         let found = self.read(reg::ID)?;
         if !self.part.device_ids.contains(&(found >> 4)) {
             return Err(Error::Identity { found, part: self.part.name });
@@ -116,11 +119,11 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(())
     }
 
-    /// Applies the settings and reads every one of them back.
+    /// Applies the settings and reads each of them back.
     ///
     /// # Errors
-    /// [`Error::NoRange`], [`Error::NoLayout`] before anything is written; [`Error::Readback`] when the chip
-    /// did not take one.
+    /// [`Error::NoRange`], [`Error::NoLayout`] before anything is written; [`Error::Readback`] when
+    /// the chip did not accept a value.
     pub fn configure(&mut self, settings: &Settings) -> Done<S, R> {
         let part = self.part.name;
         if let Some(range) = settings.ranges.into_iter().find(|range| !self.part.ranges.contains(range)) {
@@ -129,7 +132,7 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         if Layout::new(self.part, settings.lines, settings.crc).is_none() {
             return Err(Error::NoLayout { part });
         }
-        // the CRC first, so that it covers the rest
+        // enable the CRC first, so that it protects the remaining accesses
         self.watch_itself(settings.crc, false)?;
         self.write(reg::CONFIG, settings.lines.code() << reg::LINES_SHIFT)?;
         for (pair, address) in settings.ranges.as_chunks::<2>().0.iter().zip(reg::RANGE_CH1_CH2..) {
@@ -148,11 +151,11 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         &self.settings
     }
 
-    /// Digital errors since they were last asked for; asking clears them. The bits are those of
+    /// Digital errors since the last call; reading clears them. The bits are those of
     /// [`super::registers`].
     ///
     /// # Errors
-    /// The port's own.
+    /// Errors of the port.
     pub fn digital_errors(&mut self) -> Done<S, R, u8> {
         let bits = self.read(reg::DIGITAL_DIAG_ERROR)?;
         if bits != 0 {
@@ -161,23 +164,23 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(bits)
     }
 
-    /// Lets the chip look for open inputs on the channels whose bits are set, by itself: an input counts as
-    /// open when it gave small codes for `conversions` in a row and then follows a change of the amplifier's
-    /// common mode, which a driven input does not (AD7606B Rev. 0, "Open Circuit Detection"; each input
-    /// needs 10 kΩ across it at the source end).
+    /// Enables the chip's automatic open-circuit detection on the channels whose bits are set. An
+    /// input counts as open when it gave small codes for `conversions` consecutive conversions and
+    /// then follows a change of the amplifier's common mode, which a driven input does not (AD7606B
+    /// Rev. 0, "Open Circuit Detection"; each input needs 10 kΩ across it at the source end).
     ///
     /// # Errors
-    /// The port's own, or [`Error::Readback`].
+    /// Errors of the port, or [`Error::Readback`].
     pub fn watch_inputs(&mut self, channels: u8, conversions: u8) -> Done<S, R> {
-        // 1 is the manual way, in which the chip does not judge
+        // 1 selects manual mode, in which the chip makes no decision
         self.write(reg::OPEN_DETECT_QUEUE, conversions.max(2))?;
         self.write(reg::OPEN_DETECT_ENABLE, channels)
     }
 
-    /// Channels that were found open since they were last asked for, one bit each; asking clears them.
+    /// Channels found open since the last call, one bit each; reading clears them.
     ///
     /// # Errors
-    /// The port's own.
+    /// Errors of the port.
     pub fn open_inputs(&mut self) -> Done<S, R, u8> {
         let bits = self.read(reg::OPEN_DETECTED)?;
         if bits != 0 {
@@ -186,19 +189,20 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(bits)
     }
 
-    /// Whether the chip was reset since this was last asked: by a dip of its supply, if not by us.
+    /// Whether the chip was reset since the last call: by a supply dip, unless the driver did it.
     ///
     /// # Errors
-    /// The port's own.
+    /// Errors of the port.
     pub fn was_reset(&mut self) -> Done<S, R, bool> {
         Ok(self.read(reg::STATUS)? & reg::RESET_DETECT != 0)
     }
 
-    /// Starts one conversion, waits for its end and reads it through DOUTA. With several lines in use, the
-    /// channels of the others stay 0: a single port reads a single line.
+    /// Starts one conversion, waits for its end and reads the result through DOUTA. With several
+    /// lines in use, the channels of the other lines stay 0, because a single port reads a single
+    /// line.
     ///
     /// # Errors
-    /// [`Error::BusyStuck`], [`Error::Data`], or the port's and pins' own.
+    /// [`Error::BusyStuck`], [`Error::Data`], or errors of the port and pins.
     pub async fn convert<C, B>(
         &mut self,
         convst: &mut C,
@@ -218,23 +222,24 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
             Either::First(fallen) => fallen.map_err(Error::Pin)?,
             Either::Second(()) => return Err(Error::BusyStuck { after_us }),
         }
-        // all of it on the first line, whichever others are in use: what follows a line's own data is not read
+        // read only the first line, also when others are in use: bytes after a line's own data are
+        // not read
         let layout = Layout::new(self.part, self.settings.lines, self.settings.crc)
             .ok_or(Error::NoLayout { part: self.part.name })?;
         let mut line = [0; LINE_BYTES_MAX];
         let line = &mut line[..layout.bytes()];
-        // zeros on SDI: anything else could be a command
+        // zeros on SDI: anything else could be interpreted as a command
         self.spi.transfer_in_place(line).map_err(Error::Spi)?;
         let mut codes = [0; CHANNELS];
         layout.decode(line, &mut codes).map_err(Error::Data)?;
         Ok(codes)
     }
 
-    /// Lets the chip send its known pattern in place of a conversion, checks what arrives, and then what the
-    /// chip found wrong with itself.
+    /// Makes the chip send its known test pattern instead of a conversion, checks the received
+    /// data, and then reads the chip's own diagnostics.
     ///
     /// # Errors
-    /// [`Error::Pattern`], [`Error::Digital`], and all of [`Self::convert`].
+    /// [`Error::Pattern`], [`Error::Digital`], and all errors of [`Self::convert`].
     pub async fn self_test<C, B>(
         &mut self,
         convst: &mut C,
@@ -246,7 +251,7 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         B: Wait<Error = R::Error>,
     {
         self.watch_itself(self.crc, true)?;
-        // the first conversion after the switch is still an old one
+        // the first conversion after the switch still returns old data
         self.convert(convst, busy, delay).await?;
         let codes = self.convert(convst, busy, delay).await?;
         self.watch_itself(self.crc, false)?;
@@ -264,8 +269,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         }
     }
 
-    /// Writes DIGITAL_DIAG_ENABLE. The frame that switches the CRC on has none yet; the one that switches it
-    /// off still has one.
+    /// Writes DIGITAL_DIAG_ENABLE. The frame that enables the CRC does not carry one yet; the frame
+    /// that disables it still does.
     fn watch_itself(&mut self, crc: bool, pattern: bool) -> Done<S, R> {
         let value = WATCHED
             | if crc { reg::INTERFACE_CRC } else { 0 }
@@ -290,7 +295,7 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
     fn read(&mut self, address: u8) -> Done<S, R, u8> {
         self.send(reg::read_command(address))?;
         self.in_registers = true;
-        // the answer comes with whatever frame is next: the same command again changes nothing
+        // the value arrives with the next frame; repeating the same command has no side effect
         let [echo, value, crc] = self.send(reg::read_command(address))?;
         if self.crc && crc != reg::frame_crc([echo, value]) {
             return Err(Error::RegisterCrc { address });
@@ -313,7 +318,7 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
         Ok(())
     }
 
-    /// One frame; returns what the chip said meanwhile.
+    /// Transfers one frame and returns the bytes received meanwhile.
     fn send(&mut self, command: [u8; 2]) -> Done<S, R, [u8; 3]> {
         let mut frame = [command[0], command[1], reg::frame_crc(command)];
         let used = if self.crc { 3 } else { 2 };

@@ -1,4 +1,4 @@
-//! What can go wrong with a converter, in words for whoever stands at the rig.
+//! Errors of a converter, with messages for the operator at the rig.
 
 use core::fmt;
 
@@ -13,24 +13,24 @@ pub enum Error<S, P> {
     Spi(S),
     /// A pin failed.
     Pin(P),
-    /// After a reset pulse the chip does not say that it was reset.
+    /// After a reset pulse the chip does not report a reset.
     NotReset {
         /// Its STATUS register.
         status: u8,
     },
-    /// Another chip, or none.
+    /// A different chip responds, or none.
     Identity {
-        /// The ID register.
+        /// The value of the ID register.
         found: u8,
-        /// The part that should be there.
+        /// The expected part.
         part: &'static str,
     },
-    /// The chip's answer to a register command has a wrong CRC.
+    /// The response to a register command has a wrong CRC.
     RegisterCrc {
-        /// The address that was read.
+        /// The address of the register read.
         address: u8,
     },
-    /// A register does not hold what was written to it.
+    /// A register does not hold the value written to it.
     Readback {
         /// The register.
         address: u8,
@@ -39,30 +39,30 @@ pub enum Error<S, P> {
         /// What it holds.
         holds: u8,
     },
-    /// The part has no such range.
+    /// The part does not support this range.
     NoRange {
-        /// The range asked for.
+        /// The requested range.
         range: Range,
         /// The part.
         part: &'static str,
     },
-    /// The part cannot send its data like this.
+    /// The part does not support this data layout.
     NoLayout {
         /// The part.
         part: &'static str,
     },
-    /// BUSY did not fall.
+    /// BUSY did not fall in time.
     BusyStuck {
-        /// How long was waited, µs.
+        /// The waiting time, µs.
         after_us: u32,
     },
     /// The data of a conversion have a wrong CRC.
     Data(CrcMismatch),
-    /// The known pattern did not arrive: a line is broken, shorted or too fast.
+    /// The test pattern was not received: a line is broken, shorted or clocked too fast.
     Pattern {
         /// The channel, from 0.
         channel: usize,
-        /// What arrived.
+        /// The value received.
         found: u16,
     },
     /// The chip reports digital errors: the bits of DIGITAL_DIAG_ERROR.

@@ -1,8 +1,9 @@
-//! What comes out of the DOUT lines after a conversion, and the CRC behind it.
+//! Data on the DOUT lines after a conversion, and the CRC that follows them.
 //!
-//! Channels come in order, most significant bit first, shared evenly between the lines in use: one line
-//! carries V1…V8, two carry V1…V4 and V5…V8, and so on. With the CRC on, each line ends with 16 bits over the
-//! data of that line alone (AD7606B Rev. 0, "Interface CRC Checksum").
+//! Channels are sent in order, most significant bit first, divided evenly between the lines in use:
+//! one line carries V1…V8, two carry V1…V4 and V5…V8, and so on. With the CRC enabled, each line
+//! ends with a 16-bit CRC over the data of that line only (AD7606B Rev. 0, "Interface CRC
+//! Checksum").
 
 use crc::{Algorithm, Crc, NoTable};
 
@@ -14,11 +15,11 @@ pub const CRC_BYTES: usize = 2;
 /// Most bytes that one line carries after one conversion: eight channels of 18 bits and the CRC.
 pub const LINE_BYTES_MAX: usize = CHANNELS * 18 / 8 + CRC_BYTES;
 
-/// What the channels read while INTERFACE_CHECK is on: AD7606B Rev. 0, "Interface Check".
+/// Values of the channels while INTERFACE_CHECK is set: AD7606B Rev. 0, "Interface Check".
 pub const INTERFACE_PATTERN: [u16; CHANNELS] =
     [0xACCA, 0x5CC5, 0xA33A, 0x5335, 0xCAAC, 0xC55C, 0x3AA3, 0x3553];
 
-/// x¹⁶ + x¹⁴ + x¹³ + x¹² + x¹⁰ + x⁸ + x⁶ + x⁴ + x³ + x + 1 from zero.
+/// x¹⁶ + x¹⁴ + x¹³ + x¹² + x¹⁰ + x⁸ + x⁶ + x⁴ + x³ + x + 1, initial value zero.
 const DATA_CRC: Algorithm<u16> = Algorithm {
     width: 16,
     poly: 0x755B,
@@ -26,11 +27,12 @@ const DATA_CRC: Algorithm<u16> = Algorithm {
     refin: false,
     refout: false,
     xorout: 0,
-    // of "123456789", worked out bit by bit in the test below
+    // CRC of "123456789", computed bit by bit in the test below
     check: 0x2E8F,
     residue: 0,
 };
-/// Bit by bit: it is for the few conversions of a set-up. What runs with every scan is [`jointrig_hot::pair`].
+/// Computed bit by bit, because it is used only for the few conversions during set-up.
+/// [`jointrig_hot::pair`] is used for every scan.
 const DATA: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&DATA_CRC);
 
 /// The CRC over a line's data.
@@ -39,17 +41,17 @@ pub fn data_crc(data: &[u8]) -> u16 {
     DATA.checksum(data)
 }
 
-/// A line's CRC is not that of its data.
+/// The CRC received on a line does not match its data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CrcMismatch {
-    /// What the chip sent.
+    /// The CRC received.
     pub sent: u16,
-    /// What its data ask for.
+    /// The CRC computed from the data.
     pub due: u16,
 }
 
-/// How one line's data are laid out.
+/// Layout of the data on one line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     bits: u8,
@@ -58,8 +60,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of each of `lines` lines; `None` when the part has not so many, or when a line would not
-    /// be whole bytes (18 bits on four or eight lines).
+    /// The layout of each of `lines` lines; `None` when the part does not have that many, or when a
+    /// line would not carry whole bytes (18 bits on four or eight lines).
     #[must_use]
     pub fn new(part: &Part, lines: Lines, crc: bool) -> Option<Self> {
         let channels = CHANNELS / lines.count();
@@ -83,11 +85,11 @@ impl Layout {
         self.channels * usize::from(self.bits) / 8
     }
 
-    /// Reads one line's bytes into the codes of its channels, sign extended. What `line` or `codes` is too
-    /// short for is left out.
+    /// Decodes one line's bytes into the codes of its channels, sign-extended. Channels for which
+    /// `line` or `codes` is too short are left unchanged.
     ///
     /// # Errors
-    /// [`CrcMismatch`], and then `codes` is untouched.
+    /// [`CrcMismatch`]; `codes` is then unchanged.
     pub fn decode(&self, line: &[u8], codes: &mut [i32]) -> Result<(), CrcMismatch> {
         let (data, rest) = line.split_at(self.data_bytes().min(line.len()));
         if self.crc {
@@ -118,7 +120,7 @@ mod tests {
     use super::super::part::{AD7606B, AD7606C_18};
     use super::*;
 
-    /// The polynomial division, bit by bit, as the data sheet describes it.
+    /// Polynomial division bit by bit, as the data sheet describes it.
     fn by_hand(data: &[u8]) -> u16 {
         let bits = data.iter().flat_map(|byte| (0..8).rev().map(move |i| byte >> i & 1));
         bits.fold(0, |crc: u16, bit| {

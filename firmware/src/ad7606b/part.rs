@@ -1,12 +1,12 @@
-//! What differs between the parts that fit one footprint.
+//! Differences between the parts that fit the same footprint.
 
 use super::range::Range;
 
-/// How many conversions the chip averages into one sample.
+/// Number of conversions that the chip averages into one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Oversampling {
-    /// One: none.
+    /// One: no oversampling.
     X1,
     /// Two.
     X2,
@@ -27,7 +27,7 @@ pub enum Oversampling {
 }
 
 impl Oversampling {
-    /// What OS_RATIO of the OVERSAMPLING register means by it.
+    /// Code in OS_RATIO of the OVERSAMPLING register.
     #[must_use]
     pub const fn code(self) -> u8 {
         self as u8
@@ -40,7 +40,7 @@ impl Oversampling {
     }
 }
 
-/// Lines on which data comes out at once.
+/// DOUT lines used simultaneously.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Lines {
@@ -61,38 +61,38 @@ impl Lines {
         self as u8
     }
 
-    /// How many there are.
+    /// Number of lines.
     #[must_use]
     pub const fn count(self) -> usize {
         1 << self as u8
     }
 }
 
-/// One part: what the driver must know to tell it from its relatives and to read it.
+/// One part: the data that the driver needs to identify and read it.
 #[derive(Debug, PartialEq)]
 pub struct Part {
     /// Its name.
     pub name: &'static str,
-    /// DEVICE_ID, the upper half of the ID register. The AD7606C's data sheet says 3; chips that answer 2
-    /// have been met, so both are taken.
+    /// DEVICE_ID, the upper half of the ID register. The AD7606C's data sheet states 3; chips that
+    /// return 2 exist, so both are accepted.
     pub device_ids: &'static [u8],
     /// Bits of a conversion.
     pub bits: u8,
-    /// Ranges of its inputs, single-ended and bipolar.
+    /// Supported input ranges, single-ended and bipolar.
     pub ranges: &'static [Range],
-    /// Most lines on which data can come out at once.
+    /// Largest number of DOUT lines used simultaneously.
     pub most_lines: Lines,
-    /// Whether each channel's filter can be told to pass 220 kHz instead of 25 kHz (BANDWIDTH register).
+    /// Whether each channel's filter can be set to 220 kHz instead of 25 kHz (BANDWIDTH register).
     pub has_bandwidth: bool,
     /// Longest time from CONVST to the end of BUSY, µs, by [`Oversampling`].
     conversion_us: [u16; 9],
 }
 
-/// tCONV, the longest, rounded up to whole µs: AD7606B Rev. 0, "Timing Specifications"; the
+/// tCONV, maximum, rounded up to whole µs: AD7606B Rev. 0, "Timing Specifications"; the
 /// manufacturer's own driver waits as long.
 const CONVERSION_US: [u16; 9] = [1, 3, 5, 10, 20, 41, 81, 162, 324];
 
-/// Eight channels of 16 bits, 800 kSPS, 5 MΩ inputs; filter 11.5 to 23 kHz by range.
+/// Eight channels of 16 bits, 800 kSPS, 5 MΩ inputs; filter 11.5 to 23 kHz, depending on the range.
 pub const AD7606B: Part = Part {
     name: "AD7606B",
     device_ids: &[1],
@@ -118,7 +118,7 @@ pub const AD7606C_16: Part = Part {
     conversion_us: CONVERSION_US,
 };
 
-/// Eight channels of 18 bits, else as the AD7606C-16.
+/// Eight channels of 18 bits, otherwise like the AD7606C-16.
 pub const AD7606C_18: Part = Part { name: "AD7606C-18", bits: 18, ..AD7606C_16 };
 
 impl Part {
@@ -128,7 +128,7 @@ impl Part {
         self.conversion_us[oversampling as usize] as u32
     }
 
-    /// By how much a sample lags the instant of CONVST, ns: half of the time over which it is averaged.
+    /// Delay of a sample relative to CONVST, ns: half of the averaging time.
     #[must_use]
     pub const fn averaging_delay_ns(&self, oversampling: Oversampling) -> u32 {
         match oversampling {

@@ -1,7 +1,7 @@
-//! Input ranges; codes to volts and back.
+//! Input ranges; conversion between codes and volts.
 //!
-//! A code is two's complement, and code 0 is 0 V: one step is `2 × full scale / 2^bits` (AD7606B Rev. 0, "ADC
-//! Transfer Function").
+//! A code is two's complement, and code 0 is 0 V: one step is `2 × full scale / 2^bits` (AD7606B
+//! Rev. 0, "ADC Transfer Function").
 
 /// Full scale of a channel, single-ended and bipolar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,8 +20,8 @@ pub enum Range {
 }
 
 impl Range {
-    /// Its code in the RANGE registers. The AD7606B takes every code above 1 for ± 10 V and has 3 after a
-    /// reset; the AD7606C means ± 10 V by 3: so 3 is right for both.
+    /// Its code in the RANGE registers. The AD7606B interprets every code above 1 as ± 10 V and has
+    /// 3 after a reset; on the AD7606C, 3 means ± 10 V; so 3 is correct for both.
     #[must_use]
     pub const fn code(self) -> u8 {
         self as u8
@@ -47,24 +47,24 @@ impl Range {
             .find(|range| (range.full_scale_v() - full_scale_v).abs() < 1e-3)
     }
 
-    /// The voltage that a code of `bits` bits stands for, V.
+    /// The voltage of a code of `bits` bits, V.
     #[must_use]
     pub fn volts(self, code: i32, bits: u8) -> f32 {
         code as f32 * self.full_scale_v() / half_span(bits)
     }
 
-    /// The code of `bits` bits that a voltage comes out as; what is beyond the range comes out as its end.
+    /// The code of `bits` bits for a voltage; saturates at the ends of the range.
     #[must_use]
     pub fn code_of(self, volts: f32, bits: u8) -> i32 {
         let half = half_span(bits);
         let steps = volts / self.full_scale_v() * half;
-        // half a step away from zero, then cut: rounding without std
+        // rounding without std: add half a step away from zero, then truncate
         let rounded = (steps + if steps < 0.0 { -0.5 } else { 0.5 }).clamp(-half, half - 1.0);
         rounded as i32
     }
 }
 
-/// Half of the codes there are.
+/// Half of the number of codes.
 fn half_span(bits: u8) -> f32 {
     (1_u32 << (bits - 1)) as f32
 }

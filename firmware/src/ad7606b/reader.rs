@@ -1,4 +1,5 @@
-//! From blocks of two rings to scans: proven, joined, and with a count of those that are missing before them.
+//! Converts blocks of two rings into scans: proven, joined, and with the number of scans missing
+//! before them.
 
 use jointrig_hot::pair::{CHIP_BYTES, join};
 
@@ -6,55 +7,58 @@ use super::alignment::{Alignment, Moment, Verdict};
 use super::trouble::Trouble;
 use crate::board::Delivered;
 
-/// Looks at a moment before a read-out that never ends counts as one that does not come: one takes a few µs.
+/// Readings of a moment after which a read-out is considered stuck; a read-out takes a few µs.
 const LOOKS: u32 = 1_000;
 
 /// Reads two rings, block by block.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader {
     alignment: Alignment,
-    /// Channels of a scan.
+    /// Channels in a scan.
     channels: usize,
-    /// The block that is due.
+    /// The next block to be read.
     block: u32,
-    /// The clock's count of periods at the rings' start.
+    /// The clock's count of periods when the rings were started.
     started_at: u32,
-    /// Up to where scans have been delivered or reported missing, in that count.
+    /// Period count up to which scans have been delivered or reported missing.
     accounted: u32,
 }
 
 impl Reader {
-    /// Nothing is read before [`Reader::start`]; scans are missing from `now` on, in the clock's count of periods.
+    /// A reader that reads nothing before [`Reader::start`]; scans are missing from `now` on, in
+    /// the clock's count of periods.
     #[must_use]
     pub fn new(alignment: Alignment, channels: usize, now: u32) -> Self {
         Self { alignment, channels, block: 0, started_at: now, accounted: now }
     }
 
-    /// The rings were started, empty, and their first scan is that of period `at`.
+    /// Call after the rings were started empty, with their first scan in period `at`.
     pub fn start(&mut self, at: u32) {
         (self.block, self.started_at) = (0, at);
     }
 
-    /// The block that is due.
+    /// The next block to be read.
     #[must_use]
     pub fn due(&self) -> u32 {
         self.block
     }
 
-    /// The period of the next scan that will be delivered or reported missing, in the clock's count.
+    /// The period of the next scan to be delivered or reported missing, in the clock's count.
     #[must_use]
     pub fn next_period(&self) -> u32 {
         self.accounted
     }
 
-    /// Takes the block that is due from the rings' own memory; `look` reads a moment off, with the clock's own count of periods. It is
-    /// called after the block was read, so that a block is proven not to have been overwritten meanwhile. Good scans are
-    /// written to `scans`, which hold nothing of worth after an error.
+    /// Reads the next block directly from the rings' memory. `look` reads a moment, with the
+    /// clock's own count of periods. It is called after the block was copied, which proves that the
+    /// block was not overwritten meanwhile. Good scans are written to `scans`, whose content is
+    /// meaningless after an error.
     ///
-    /// A wrong CRC ends the block there, and is told besides.
+    /// A wrong CRC ends the block at that scan and is reported in addition.
     ///
     /// # Errors
-    /// [`Trouble::Slipped`] or [`Trouble::Overrun`]: nothing of the block can be trusted, and the rings must be started anew.
+    /// [`Trouble::Slipped`] or [`Trouble::Overrun`]: nothing in the block can be trusted, and the
+    /// rings must be restarted.
     pub fn take(
         &mut self,
         [first, second]: [&[[u8; CHIP_BYTES]]; 2],
@@ -86,7 +90,7 @@ impl Reader {
         Err(Trouble::Overrun)
     }
 
-    /// Nothing can be delivered; what has gone by until `now` is missing.
+    /// Reports that no scan can be delivered; all scans up to `now` are missing.
     pub fn nothing(&mut self, now: u32) -> Delivered {
         let missed = now.wrapping_sub(self.accounted);
         self.accounted = now;

@@ -6,53 +6,53 @@ use crc::{Algorithm, Crc, Table};
 pub const STATUS: u8 = 0x01;
 /// STATUS: a reset has happened; reading clears it.
 pub const RESET_DETECT: u8 = 1 << 7;
-/// STATUS: [`DIGITAL_DIAG_ERROR`] says more.
+/// STATUS: see [`DIGITAL_DIAG_ERROR`] for details.
 pub const DIGITAL_ERROR: u8 = 1 << 6;
-/// STATUS: [`OPEN_DETECTED`] says more.
+/// STATUS: see [`OPEN_DETECTED`] for details.
 pub const OPEN_CIRCUIT: u8 = 1 << 5;
 
 /// DOUT lines and power.
 pub const CONFIG: u8 = 0x02;
-/// Where the number of lines stands in CONFIG.
+/// Position of the number of lines in CONFIG.
 pub const LINES_SHIFT: u8 = 3;
 
-/// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is the lower
-/// half.
+/// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is in
+/// the lower half.
 pub const RANGE_CH1_CH2: u8 = 0x03;
-/// One bit a channel: 1 passes 220 kHz (AD7606C only).
+/// One bit per channel: 1 selects 220 kHz (AD7606C only).
 pub const BANDWIDTH: u8 = 0x07;
 /// OS_RATIO in the lower half.
 pub const OVERSAMPLING: u8 = 0x08;
 
-/// What the chip watches of itself.
+/// Enables the chip's self-diagnostics.
 pub const DIGITAL_DIAG_ENABLE: u8 = 0x21;
-/// What it found; writing 1 to a bit clears it.
+/// Errors found; writing 1 to a bit clears it.
 pub const DIGITAL_DIAG_ERROR: u8 = 0x22;
 /// The chip's own ROM has a wrong CRC.
 pub const ROM_CRC: u8 = 1 << 0;
-/// The register map has changed by itself.
+/// The register map changed without a write.
 pub const MEMORY_MAP_CRC: u8 = 1 << 1;
 /// CRC on data and on register frames.
 pub const INTERFACE_CRC: u8 = 1 << 2;
-/// A write went to an address that cannot be written.
+/// A write addressed a register that cannot be written.
 pub const SPI_WRITE: u8 = 1 << 3;
-/// A read went to an address that does not exist.
+/// A read addressed a register that does not exist.
 pub const SPI_READ: u8 = 1 << 4;
 /// BUSY was high for more than 4 µs after a conversion should have ended.
 pub const BUSY_STUCK_HIGH: u8 = 1 << 5;
 /// Conversions are replaced by [`super::frames::INTERFACE_PATTERN`] (in the enable register only).
 pub const INTERFACE_CHECK: u8 = 1 << 7;
 
-/// One bit a channel: look for an open input.
+/// One bit per channel: enables open-circuit detection.
 pub const OPEN_DETECT_ENABLE: u8 = 0x23;
-/// One bit a channel: the input is open; writing 1 to a bit clears it.
+/// One bit per channel: the input is open; writing 1 to a bit clears it.
 pub const OPEN_DETECTED: u8 = 0x24;
-/// Conversions that must agree before an input counts as open; 1 is the manual way.
+/// Number of consistent conversions before an input counts as open; 1 selects manual mode.
 pub const OPEN_DETECT_QUEUE: u8 = 0x2C;
-/// DEVICE_ID above SILICON_REVISION.
+/// DEVICE_ID in the upper half, SILICON_REVISION in the lower half.
 pub const ID: u8 = 0x2F;
 
-/// The command that reads `address`: the answer comes with the next frame.
+/// The command that reads `address`; the value arrives with the next frame.
 #[must_use]
 pub const fn read_command(address: u8) -> [u8; 2] {
     [0x40 | (address & 0x3F), 0]
@@ -64,10 +64,11 @@ pub const fn write_command(address: u8, value: u8) -> [u8; 2] {
     [address & 0x3F, value]
 }
 
-/// Leads back to ADC mode.
+/// The command that returns to ADC mode.
 pub const LEAVE: [u8; 2] = [0, 0];
 
-/// x⁸ + x² + x + 1 from zero: the third byte of a register frame while [`INTERFACE_CRC`] is on.
+/// x⁸ + x² + x + 1, initial value zero: the third byte of a register frame while [`INTERFACE_CRC`]
+/// is set.
 const FRAME_CRC: Algorithm<u8> = Algorithm {
     width: 8,
     poly: 0x07,
@@ -75,7 +76,7 @@ const FRAME_CRC: Algorithm<u8> = Algorithm {
     refin: false,
     refout: false,
     xorout: 0,
-    // of "123456789"
+    // CRC of "123456789"
     check: 0xF4,
     residue: 0,
 };

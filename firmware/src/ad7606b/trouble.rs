@@ -1,19 +1,21 @@
-//! What goes wrong with the converters while they run, in the words that reach the host.
+//! Faults of the converters during acquisition, with the messages sent to the host.
 
 use core::fmt;
 
 use crate::sentence::{Sentence, Tell};
 
-/// A front end's trouble. The scans that it cost are reported as a lost range besides.
+/// A fault of the front end. The scans lost by it are also reported as a lost range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// No block came: blocks that each converter had sent. BUSY does not fall, or nothing starts the read-out.
+    /// No block arrived; contains the blocks that each converter had sent. BUSY does not fall, or
+    /// the read-out is not started.
     Silent(u32, u32),
     /// A scan's CRC is wrong.
     Crc,
-    /// The converters are out of step with their clock: words by which each is behind it, negative when ahead (9 are a scan).
+    /// The converters are not aligned with their clock: words by which each is behind, negative
+    /// when ahead (9 words are a scan).
     Slipped(i32, i32),
-    /// The reader was too late for the rings.
+    /// The reader was too late, and the rings were overwritten.
     Overrun,
     /// The DMA reported an error.
     Dma,

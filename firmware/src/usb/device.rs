@@ -1,4 +1,4 @@
-//! Descriptors: who the device is, and which interfaces it has.
+//! Descriptors: identity of the device and its interfaces.
 
 use core::sync::atomic::AtomicU8;
 
@@ -12,18 +12,19 @@ use jointrig_protocol::usb::{INTERFACE_CLASS, PRODUCT, PRODUCT_ID, VENDOR_ID};
 use super::link::{Bulk, Choice, Sink, Source};
 use super::windows::{self, Windows};
 
-/// What the bus came up at.
+/// Speed of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Speed {
-    /// 12 Mbit/s: eight channels at most at 51.2 kHz.
+    /// 12 Mbit/s: at most eight channels at 51.2 kHz.
     Full,
     /// 480 Mbit/s.
     High,
 }
 
 impl Speed {
-    /// Bytes of a bulk packet; at either speed no other size is legal for what we need (USB 2.0, 5.8.3).
+    /// Size of a bulk packet in bytes; at either speed no other size is permitted for this use (USB
+    /// 2.0, 5.8.3).
     #[must_use]
     pub const fn bulk_packet(self) -> u16 {
         match self {
@@ -33,7 +34,7 @@ impl Speed {
     }
 }
 
-/// Memory for descriptors and the serial port's state. It outlives the device that is built in it.
+/// Memory for descriptors and the serial port's state. It outlives the device built in it.
 pub struct Buffers<'d> {
     config: [u8; 192],
     bos: [u8; 64],
@@ -44,7 +45,7 @@ pub struct Buffers<'d> {
     windows: Windows,
 }
 
-/// Tells the link that the bus was suspended.
+/// Informs the link that the bus was suspended.
 struct Suspension<'d>(&'d Choice);
 
 impl Handler for Suspension<'_> {
@@ -81,7 +82,7 @@ impl Buffers<'_> {
     }
 }
 
-/// A built device. `device` must be run beside whatever uses `source` and `sink`.
+/// A built device. `device` must run concurrently with the users of `source` and `sink`.
 pub struct Usb<'d, D: Driver<'d>> {
     /// The device: enumeration and control requests.
     pub device: UsbDevice<'d, D>,
@@ -91,7 +92,8 @@ pub struct Usb<'d, D: Driver<'d>> {
     pub sink: Sink<'d, D>,
 }
 
-/// Builds the device. `serial` tells this board from all others: a host finds its rig by it.
+/// Builds the device. `serial` distinguishes this board from all others; a host uses it to find its
+/// rig.
 pub fn build<'d, D: Driver<'d>>(
     driver: D,
     buffers: &'d mut Buffers<'d>,

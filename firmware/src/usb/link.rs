@@ -1,4 +1,4 @@
-//! Frames over the two interfaces: which one is spoken on, and what happens when the bus goes away.
+//! Frames over the two interfaces: selection of the interface, and handling of a lost bus.
 
 use core::future::poll_fn;
 use core::pin::pin;
@@ -15,20 +15,20 @@ use crate::board::{ByteSink, ByteSource};
 /// Most bytes of one packet, at any speed.
 const PACKET: usize = 512;
 
-/// One of the two ways.
+/// One of the two interfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Vendor,
     SerialPort,
 }
 
-/// Which way the host has chosen; shared by source and sink.
+/// The interface chosen by the host; shared by source and sink.
 pub(super) struct Choice {
-    /// 0: neither yet; else the way's number plus one.
+    /// 0: none yet; otherwise the number of the [`Way`] plus one.
     pub(super) active: AtomicU8,
-    /// It has changed.
+    /// Signals a change.
     pub(super) changed: Signal<CriticalSectionRawMutex, ()>,
-    /// The bus was suspended.
+    /// Signals that the bus was suspended.
     pub(super) suspended: Signal<CriticalSectionRawMutex, ()>,
 }
 
@@ -47,7 +47,7 @@ impl Choice {
     }
 }
 
-/// A bare bulk endpoint.
+/// A plain bulk endpoint.
 pub(super) struct Bulk<E>(pub(super) E);
 
 /// Packets from the host.
@@ -111,11 +111,11 @@ impl<'d, D: Driver<'d>> Outgoing for Sender<'d, D> {
     }
 }
 
-/// One way in: its packet in hand, and whether the host had enabled it when last looked.
+/// One incoming interface: its current packet, and whether it was enabled at the last check.
 struct Inlet<P> {
     pipe: P,
     enabled: bool,
-    /// Nothing was waited for since it was enabled.
+    /// No read has had to wait since it was enabled.
     fresh: bool,
     bytes: [u8; PACKET],
 }
@@ -125,8 +125,8 @@ impl<P: Incoming> Inlet<P> {
         Self { pipe, enabled: false, fresh: false, bytes: [0; PACKET] }
     }
 
-    /// The length of the next packet that is not empty, or `None` once when the way was cut. It may be dropped
-    /// while it waits: a packet is taken in one step or not at all.
+    /// The length of the next non-empty packet, or `None` once when the interface was cut. The
+    /// future may be dropped while it waits: a packet is taken in one step or not at all.
     async fn next(&mut self) -> Option<usize> {
         loop {
             if !self.enabled {
@@ -141,7 +141,7 @@ impl<P: Incoming> Inlet<P> {
                 came
             });
             match came.await {
-                // It waited since before the cut: no order of it may be carried out.
+                // The packet was pending since before the cut; it must not be carried out.
                 Ok(_) if self.fresh => {}
                 Ok(0) => {}
                 Ok(length) => return Some(length),
@@ -154,7 +154,7 @@ impl<P: Incoming> Inlet<P> {
     }
 }
 
-/// A packet that was not yet handed over whole.
+/// A packet that was not yet completely passed on.
 #[derive(Clone, Copy)]
 struct Held {
     way: Way,
@@ -162,7 +162,7 @@ struct Held {
     to: usize,
 }
 
-/// Bytes from the host, from whichever interface it speaks on.
+/// Bytes from the host, from the interface that it uses.
 pub struct Source<'d, D: Driver<'d>> {
     vendor: Inlet<Bulk<D::EndpointOut>>,
     serial_port: Inlet<Receiver<'d, D>>,
@@ -205,7 +205,8 @@ impl<'d, D: Driver<'d>> ByteSource for Source<'d, D> {
                 Either3::First(came) => (Way::Vendor, came),
                 Either3::Second(came) => (Way::SerialPort, came),
                 Either3::Third(()) => {
-                    // a host that sleeps, or whose cable was pulled, takes back no order: as good as cut
+                    // a host that sleeps or whose cable was unplugged can no longer cancel a
+                    // request: treat it as cut
                     if self.choice.get().is_none() {
                         continue;
                     }
@@ -216,7 +217,7 @@ impl<'d, D: Driver<'d>> ByteSource for Source<'d, D> {
             let before = self.choice.get();
             let Some(to) = came else {
                 if before != Some(way) {
-                    // nothing was gathered on a way that nobody speaks on
+                    // nothing was received on an interface that is not in use
                     continue;
                 }
                 self.choice.set(None);
@@ -230,14 +231,15 @@ impl<'d, D: Driver<'d>> ByteSource for Source<'d, D> {
             if before.is_none() {
                 return self.hand_over(held, buffer);
             }
-            // the host has changed its mind: half a frame that came the other way is no part of this one
+            // the host changed the interface: a partial frame from the other one must not be joined
+            // with this one
             self.held = Some(held);
             return 0;
         }
     }
 }
 
-/// Bytes to the host, on the interface on which it last spoke.
+/// Bytes to the host, on the interface from which bytes last came.
 pub struct Sink<'d, D: Driver<'d>> {
     vendor: Bulk<D::EndpointIn>,
     serial_port: Sender<'d, D>,
@@ -250,7 +252,7 @@ impl<'d, D: Driver<'d>> Sink<'d, D> {
     }
 }
 
-/// Sends one frame, or what of it the bus takes before it is cut.
+/// Sends one frame, or the part of it that the bus accepts before it is cut.
 async fn send(pipe: &mut impl Outgoing, frame: &[u8]) {
     pipe.enabled().await;
     let packet_bytes = pipe.packet_bytes();
@@ -260,7 +262,8 @@ async fn send(pipe: &mut impl Outgoing, frame: &[u8]) {
         }
     }
     if frame.len().is_multiple_of(packet_bytes) {
-        // only a short packet ends what a host reads; the way being cut right here takes nothing from the frame
+        // only a short packet ends a host's read; if the interface is cut here, the frame is
+        // already complete
         let _ = pipe.packet(&[]).await;
     }
 }
@@ -279,7 +282,7 @@ impl<'d, D: Driver<'d>> ByteSink for Sink<'d, D> {
                     Way::SerialPort => send(&mut self.serial_port, frame).await,
                 }
             };
-            // a host that has gone over to the other way will never take what waits on this one
+            // a host that changed to the other interface will never accept what waits on this one
             match select(sending, self.choice.changed.wait()).await {
                 Either::First(()) => return,
                 Either::Second(()) => {}

@@ -1,33 +1,37 @@
-//! What the driver of this USB core does not do yet, done around it.
+//! Workarounds for faults of this USB core's driver.
 //!
-//! embassy-usb-synopsys-otg 0.3.3, the version that embassy-stm32 0.6.0 takes, has three faults that were mended after its last release
-//! (embassy pull request 6687, August 2026; docs/dependencies.md):
+//! embassy-usb-synopsys-otg 0.3.3, the version that embassy-stm32 0.6.0 uses, has three faults that
+//! were fixed after its last release (embassy pull request 6687, August 2026;
+//! docs/dependencies.md):
 //!
-//! - A suspend that was latched before a bus reset is told after it, and the device sleeps while the host talks to it.
-//! - An endpoint that is enabled anew goes on with the data toggle it had, where USB 2.0, 9.1.1.5 wants DATA0: the first packet after it is
-//!   taken for a repetition. The same when a halt is cleared (USB 2.0, 9.4.5).
-//! - A packet that waited while its endpoint was disabled is read when that is enabled again: [`super::link`] throws it away.
+//! - A suspend that was latched before a bus reset is reported after it, and the device sleeps
+//!   while the host communicates with it.
+//! - An endpoint that is enabled again continues with its old data toggle, where USB 2.0, 9.1.1.5
+//!   requires DATA0: the first packet afterwards is taken for a repetition. The same applies when a
+//!   halt is cleared (USB 2.0, 9.4.5).
+//! - A packet that was pending while its endpoint was disabled is read when the endpoint is enabled
+//!   again: [`super::link`] discards it.
 
 use embassy_usb::driver::{
     Bus, Driver, EndpointAddress, EndpointAllocError, EndpointType, Event, Unsupported,
 };
 
-/// The registers that this needs.
+/// The register accesses that the workarounds need.
 pub trait Registers {
-    /// Forgets a suspend that is latched, unless the bus is suspended now.
+    /// Clears a latched suspend, unless the bus is suspended now.
     fn forget_suspend(&mut self);
-    /// The endpoint's next packet is DATA0.
+    /// Makes the endpoint's next packet DATA0.
     fn begin_with_data0(&mut self, endpoint: EndpointAddress);
 }
 
-/// A driver, mended.
+/// A driver with the workarounds.
 pub struct Mended<D, R> {
     driver: D,
     registers: R,
 }
 
 impl<D, R> Mended<D, R> {
-    /// Around a driver.
+    /// Wraps a driver.
     pub fn new(driver: D, registers: R) -> Self {
         Self { driver, registers }
     }
@@ -65,7 +69,7 @@ impl<'d, D: Driver<'d>, R: Registers + 'd> Driver<'d> for Mended<D, R> {
     }
 }
 
-/// A driver's bus, mended.
+/// A driver's bus with the workarounds.
 pub struct MendedBus<B, R> {
     bus: B,
     registers: R,
@@ -90,7 +94,7 @@ impl<B: Bus, R: Registers> Bus for MendedBus<B, R> {
 
     fn endpoint_set_enabled(&mut self, endpoint: EndpointAddress, enabled: bool) {
         self.bus.endpoint_set_enabled(endpoint, enabled);
-        // endpoint 0's toggles are the core's own business: each SETUP sets them
+        // endpoint 0 is excluded: the core sets its toggles with each SETUP
         if enabled && endpoint.index() != 0 {
             self.registers.begin_with_data0(endpoint);
         }

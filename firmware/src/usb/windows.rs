@@ -1,21 +1,23 @@
-//! What Windows wants to be told: that its own WinUSB serves the vendor interface, and by which GUID a program finds that.
+//! Descriptors for Windows: they assign WinUSB to the vendor interface and give the GUID by which a
+//! program finds it.
 //!
-//! Bytes that never change, as "Microsoft OS 2.0 Descriptors Specification" has them (July 2018, tables 3 to 15). The builder that
-//! embassy-usb has for them puts them together on the controller, in 1.7 kB of flash.
+//! The bytes are constant, as defined in "Microsoft OS 2.0 Descriptors Specification" (July 2018,
+//! tables 3 to 15). embassy-usb's builder for them would assemble them on the controller, in 1.7 kB
+//! of flash.
 
 use embassy_usb::Handler;
 use embassy_usb::control::{InResponse, Recipient, Request, RequestType};
 
-/// The request by which Windows asks for the descriptors that are its own.
+/// The request with which Windows asks for its own descriptors.
 pub const VENDOR_CODE: u8 = 0x4A;
-/// By which a Windows program finds the vendor interface.
+/// The GUID by which a Windows program finds the vendor interface.
 pub const INTERFACE_GUID: &str = "{6C1E3B6A-58F0-4C4B-9D0E-6A2F1B7D9E35}";
 
-/// wIndex of the request for the whole set.
+/// wIndex of the request for the whole descriptor set.
 const DESCRIPTOR_INDEX: u16 = 7;
-/// Windows 8.1, the first that asks.
+/// Windows 8.1, the first version that requests it.
 const WINDOWS_VERSION: [u8; 4] = 0x0603_0000_u32.to_le_bytes();
-/// Under which name Windows keeps the GUID.
+/// Name of the registry property that holds the GUID.
 const PROPERTY: &str = "DeviceInterfaceGUIDs";
 const NAME: usize = utf16(PROPERTY, 1);
 const GUID: usize = utf16(INTERFACE_GUID, 2);
@@ -25,7 +27,8 @@ const SET: usize = 10 + 8 + FUNCTION;
 
 /// bDevCapabilityType of a platform capability.
 pub const PLATFORM: u8 = 5;
-/// The platform capability that names the set: its UUID, the version, the set's length, and [`VENDOR_CODE`].
+/// The platform capability that refers to the descriptor set: its UUID, the version, the set's
+/// length, and [`VENDOR_CODE`].
 pub const CAPABILITY: [u8; 25] = [
     0,
     0xDF,
@@ -55,12 +58,13 @@ pub const CAPABILITY: [u8; 25] = [
 ];
 const _: () = assert!(SET <= 0xFF, "one byte of each length is written");
 
-/// Bytes of an ASCII text in UTF-16 with so many zeros behind it.
+/// Bytes of an ASCII text in UTF-16 with `zeros` terminating zeros.
 const fn utf16(text: &str, zeros: usize) -> usize {
     2 * (text.len() + zeros)
 }
 
-/// The set: header, the one configuration, its function at interface 0, "WINUSB", and the GUID.
+/// The descriptor set: header, the one configuration, its function at interface 0, "WINUSB", and
+/// the GUID.
 static DESCRIPTORS: [u8; SET] = {
     let mut set = [0; SET];
     let mut at = 0;
@@ -70,7 +74,7 @@ static DESCRIPTORS: [u8; SET] = {
         &[8, 0, 1, 0, 0, 0, (8 + FUNCTION) as u8, 0],
         &[8, 0, 2, 0, 0, 0, FUNCTION as u8, 0],
         &[20, 0, 3, 0, b'W', b'I', b'N', b'U', b'S', b'B', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
-        // a list of texts (REG_MULTI_SZ)
+        // a list of strings (REG_MULTI_SZ)
         &[REGISTRY as u8, 0, 4, 0, 7, 0, NAME as u8, 0],
         &[GUID as u8, 0],
     ];
@@ -90,7 +94,7 @@ static DESCRIPTORS: [u8; SET] = {
     set
 };
 
-/// Writes an ASCII text in UTF-16; where it ends.
+/// Writes an ASCII text in UTF-16 and returns the end position.
 const fn write_utf16(set: &mut [u8; SET], mut at: usize, text: &str) -> usize {
     let mut i = 0;
     while i < text.len() {
@@ -100,7 +104,7 @@ const fn write_utf16(set: &mut [u8; SET], mut at: usize, text: &str) -> usize {
     at
 }
 
-/// Answers Windows.
+/// Handles the requests of Windows.
 pub struct Windows;
 
 impl Handler for Windows {
@@ -118,7 +122,7 @@ mod tests {
     #[test]
     fn every_part_says_its_length_and_they_fill_the_set() {
         let word = |at: usize| usize::from(u16::from_le_bytes([DESCRIPTORS[at], DESCRIPTORS[at + 1]]));
-        // total length, configuration's, function's
+        // total length, the configuration's, the function's
         assert_eq!((word(8), word(16), word(24)), (178, 168, 160));
         let (mut at, mut kinds) = (0, [0; 5]);
         for kind in &mut kinds {

@@ -1,15 +1,16 @@
-//! COBS: a frame's content without zeros.
+//! COBS encoding: removes zeros from a frame's content.
 //!
-//! Each word moves onto the wire, one byte further on than it stood, and then only the zeros must be replaced by the distance to
-//! the next one: small samples around zero are half zeros, so a zero costs a handful of instructions. A run without zeros
-//! that nears 254 bytes is taken byte by byte until its extra code is written.
+//! Each word is copied to the wire buffer at an offset of one byte. Afterwards only the zeros have
+//! to be replaced by the distance to the next zero. Small samples around zero contain many zero
+//! bytes, so each zero must cost only a few instructions. When a run without zeros approaches 254
+//! bytes, it is copied byte by byte until its extra code byte is written.
 
 use core::cell::Cell;
 
-/// The longest run without a zero, and the code that says so.
+/// Longest run without a zero that one code byte can represent.
 const LONGEST_RUN: usize = 254;
 
-/// Where the next byte goes, and where the code of the run in hand will.
+/// Position of the next byte, and of the code byte of the current run.
 struct Place {
     out: usize,
     code: usize,
@@ -34,8 +35,8 @@ impl Place {
 }
 
 impl Place {
-    /// Writes whole words and returns how many bytes it took: all whole words, or those before a run
-    /// nears the longest that one code can say.
+    /// Writes whole words and returns the number of bytes consumed: all whole words, or only those
+    /// before the current run approaches the longest length that one code byte can represent.
     fn push_words(&mut self, wire: &[Cell<u8>], plain: &[u8]) -> Option<usize> {
         let Self { mut out, code: mut code_at } = *self;
         let mut code = wire.get(code_at)?;
@@ -61,7 +62,7 @@ impl Place {
         Some(taken)
     }
 
-    /// Writes bytes until a code was written, and returns what is left.
+    /// Writes bytes until a code byte has been written, and returns the remaining input.
     fn push_bytes<'a>(&mut self, wire: &[Cell<u8>], mut plain: &'a [u8]) -> Option<&'a [u8]> {
         let code = self.code;
         while self.code == code
@@ -74,8 +75,8 @@ impl Place {
     }
 }
 
-/// Writes `plain` to the wire, in COBS and ended by zero; how many bytes that took, or `None` when they
-/// do not fit.
+/// Encodes `plain` into `wire` with COBS and a terminating zero. Returns the number of bytes
+/// written, or `None` when they do not fit.
 #[must_use]
 #[inline(never)]
 pub fn stuff(plain: &[u8], wire: &mut [u8]) -> Option<usize> {
@@ -96,11 +97,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A frame's longest content, and what it may become.
+    /// Longest content of a frame, and its longest encoding.
     const PLAIN: usize = 500;
     const WIRE: usize = 503;
 
-    /// What the usual crate makes of it.
+    /// Compares with the `cobs` crate.
     fn agrees(plain: &[u8]) {
         let mut expected = [0; WIRE];
         let used = cobs::encode(plain, &mut expected);

@@ -1,6 +1,6 @@
-//! One channel of a block of scans.
+//! Sum over one channel in a block of scans.
 
-/// The sum of every `channels`-th code from the `place`-th on; nothing without channels.
+/// Sum of every `channels`-th code, starting at index `place`; 0 when `channels` is 0.
 #[inline(never)]
 #[must_use]
 pub fn sum(codes: &[[u8; 2]], channels: usize, place: usize) -> i32 {

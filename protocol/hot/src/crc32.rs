@@ -1,9 +1,10 @@
-//! CRC-32 of a frame's content: on a controller four bytes at a time by tables, on a host by whatever its processor has for it.
+//! CRC-32 of a frame's content. A controller processes four bytes at a time with lookup tables; a
+//! host uses `crc32fast`, which uses the processor's CRC instructions where available.
 
 #[cfg(any(target_os = "none", test))]
 pub use tables::checksum;
 
-/// The CRC of some bytes.
+/// CRC-32 of `bytes`.
 #[cfg(not(any(target_os = "none", test)))]
 #[must_use]
 pub fn checksum(bytes: &[u8]) -> u32 {
@@ -17,11 +18,14 @@ mod tables {
     /// CRC-32/ISO-HDLC, reflected.
     const POLYNOMIAL: u32 = 0xEDB8_8320;
 
-    // What a byte does to the CRC, at once and after one to three further zero bytes. Four tables and not one of four rows: each
-    // then has its address in a register. Eight would be no faster: each byte costs its extraction, its look-up and its sum.
+    // Effect of a byte on the CRC, immediately and after one to three further zero bytes. Four
+    // separate tables instead of one with four rows, so that each table's address stays in a
+    // register. Eight tables would not be faster: each byte needs its extraction, its lookup and
+    // its XOR in any case.
     //
-    // They are filled at first use: in flash they would take 4 kB of it, and wait for it at each look-up. Whoever finds them empty
-    // fills them, twice if need be, and with the same.
+    // The tables are filled at first use: in flash they would take 4 kB and each lookup would incur
+    // flash wait states. Two callers that find the tables empty may both fill them; they write the
+    // same values.
     static AT_ONCE: Table = [const { AtomicU32::new(0) }; 256];
     static AFTER_1: Table = [const { AtomicU32::new(0) }; 256];
     static AFTER_2: Table = [const { AtomicU32::new(0) }; 256];
@@ -54,7 +58,7 @@ mod tables {
             ^ AT_ONCE[(word >> 24) as usize].load(Ordering::Relaxed)
     }
 
-    /// The CRC of some bytes.
+    /// CRC-32 of `bytes`.
     #[inline(never)]
     #[must_use]
     pub fn checksum(bytes: &[u8]) -> u32 {

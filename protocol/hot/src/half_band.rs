@@ -1,31 +1,34 @@
-//! Two scans into one: a half-band filter of eleven taps, for a front end that runs at twice the rate.
+//! Decimation by two: a half-band filter with eleven taps, for a front end that runs at twice the
+//! output rate.
 //!
-//! No image has it: docs/front-end.md says what it would bring and what it costs. The benchmark counts it, so that the figure there is measured.
+//! No firmware image uses it: docs/front-end.md describes its benefit and its cost. The benchmark
+//! measures it, so that the figure there is a measured one.
 //!
-//! The taps are `[3, 0, −25, 0, 150, 256, 150, 0, −25, 0, 3] / 512`, the maximally flat half-band filter of this length. With
-//! s = sin(ω/2) and c = cos(ω/2), ω being 2π at the input's rate, its response is c⁶ (1 + 3 s² + 6 s⁴) and a delay of five input samples.
-//! Integers hold it exactly; only the result is rounded.
+//! The taps are `[3, 0, −25, 0, 150, 256, 150, 0, −25, 0, 3] / 512`, the maximally flat half-band
+//! filter of this length. With s = sin(ω/2) and c = cos(ω/2), where ω = 2π at the input rate, its
+//! response is c⁶ (1 + 3 s² + 6 s⁴) with a delay of five input samples. Integer arithmetic is
+//! exact; only the result is rounded.
 
-/// Channels of a scan.
+/// Channels in a scan.
 pub const CHANNELS: usize = 16;
-/// Scans that one result is made of.
+/// Input scans used for one output scan.
 pub const TAPS: usize = 11;
-/// Scans of the input in a block: twice those of the output.
+/// Input scans in a block: twice the number of output scans.
 pub const INPUT: usize = 30;
-/// Taps beside the middle one that are not zero, from inside.
+/// Nonzero taps on either side of the middle tap, from the inside outwards.
 const SIDES: [i32; 3] = [150, -25, 3];
 /// The middle tap.
 const MIDDLE: i32 = 256;
-/// Of the taps' unit.
+/// Binary scaling of the taps: they are in units of 2⁻⁹.
 const SHIFT: u32 = 9;
 
 /// One scan.
 pub type Scan = [i16; CHANNELS];
 
-/// The filter of all channels.
+/// The filter state of all channels.
 #[derive(Clone, Debug)]
 pub struct HalfBand {
-    /// The last scans of the block before, and the block.
+    /// The last scans of the previous block, followed by the current block.
     scans: [Scan; TAPS - 1 + INPUT],
 }
 
@@ -36,14 +39,14 @@ impl Default for HalfBand {
 }
 
 impl HalfBand {
-    /// As after zeros for ever.
+    /// The state after an input of zeros.
     #[must_use]
     pub const fn new() -> Self {
         Self { scans: [[0; CHANNELS]; TAPS - 1 + INPUT] }
     }
 
-    /// Takes a block; each result lies in the middle of the eleven scans that end with the first, third, … of the block. What is
-    /// beyond 16 bits comes out as their end.
+    /// Filters a block. Output n is centred in the window of eleven scans that ends with scan 2 n
+    /// of the block. Results beyond 16 bits saturate.
     pub fn block(&mut self, input: &[Scan; INPUT], output: &mut [Scan; INPUT / 2]) {
         self.scans.copy_within(INPUT.., 0);
         self.scans[TAPS - 1..].copy_from_slice(input);
@@ -70,7 +73,7 @@ mod tests {
 
     const RATE_HZ: f64 = 102_400.0;
 
-    /// All taps, in their unit.
+    /// All taps, scaled to unit gain.
     fn taps() -> [f64; TAPS] {
         let mut taps = [0.0; TAPS];
         taps[5] = f64::from(MIDDLE);
@@ -80,7 +83,7 @@ mod tests {
         taps.map(|tap| tap / f64::from(1 << SHIFT))
     }
 
-    /// What the taps make of a sine: real, because they are symmetric about the middle one.
+    /// Frequency response of the taps; real, because they are symmetric about the middle tap.
     fn response(frequency_hz: f64) -> f64 {
         let turn = 2.0 * PI * frequency_hz / RATE_HZ;
         taps().iter().enumerate().map(|(i, tap)| tap * ((i as f64 - 5.0) * turn).cos()).sum()
@@ -100,7 +103,7 @@ mod tests {
         for step in 0..=1024 {
             let frequency_hz = f64::from(step) * 50.0;
             assert!((response(frequency_hz) - closed_form(frequency_hz)).abs() < 1e-12, "{frequency_hz} Hz");
-            // the two halves of the band add up to one
+            // the responses of the two half bands add up to one
             assert!((response(frequency_hz) + response(RATE_HZ / 2.0 - frequency_hz) - 1.0).abs() < 1e-12);
         }
         for step in 0..=500 {
@@ -113,7 +116,7 @@ mod tests {
         }
     }
 
-    /// What comes of a signal that all channels have, each its own part of.
+    /// Filters a signal that is applied to all channels, divided by (1 + channel).
     fn filtered(signal: impl Fn(usize) -> f64, blocks: usize) -> Vec<Scan> {
         let mut filter = HalfBand::new();
         let mut out = Vec::new();
@@ -139,7 +142,8 @@ mod tests {
                 let due = sine(2.0 * number as f64 - 5.0);
                 for (channel, code) in scan.iter().enumerate() {
                     let off = f64::from(*code) - due / (1 + channel) as f64;
-                    // a code of rounding at the input and half a code at the output, and 1.2e-4 of the sine
+                    // one code for rounding at the input, half a code at the output, and 1.2e-4 of
+                    // the sine
                     assert!(off.abs() < 1.2 + 2.5, "{frequency_hz} Hz: {off}");
                 }
             }
@@ -158,7 +162,7 @@ mod tests {
             let exact: f64 = taps().iter().enumerate().map(|(i, tap)| tap * noise(2 * number + i - 10)).sum();
             assert!((f64::from(scan[0]) - exact).abs() <= 0.5 + 1e-9, "result {number}");
         }
-        // an edge from one end to the other overshoots
+        // a step from one end of the range to the other overshoots
         let edge = filtered(|i| if i < 40 { -32_768.0 } else { 32_767.0 }, 4);
         assert!(edge.iter().any(|scan| scan[0] == i16::MAX) && edge.iter().any(|scan| scan[0] == i16::MIN));
     }

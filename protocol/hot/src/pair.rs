@@ -1,21 +1,24 @@
-//! Two converter chips of eight channels: their CRC, and scans of both.
+//! Two converter chips with eight channels each: checking their CRCs and joining their data into
+//! scans.
 //!
-//! A chip sends eight codes and, behind them, 16 bits over these (AD7606B Rev. 0, "Interface CRC Checksum"). The words lie in memory
-//! as a DMA leaves them, little-endian; the chip counts each word's upper byte first.
+//! A chip sends eight codes followed by a 16-bit CRC over them (AD7606B Rev. 0, "Interface CRC
+//! Checksum"). The words are in memory as the DMA leaves them, little-endian; the chip computes the
+//! CRC over each word's upper byte first.
 
 use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 
-/// Channels of a chip.
+/// Channels of one chip.
 pub const CHANNELS: usize = 8;
-/// Bytes of a chip's codes.
+/// Bytes of one chip's codes in a scan.
 const CODES: usize = 2 * CHANNELS;
-/// Bytes that a chip sends for one scan: its codes and the CRC.
+/// Bytes that a chip sends per scan: its codes and the CRC.
 pub const CHIP_BYTES: usize = CODES + 2;
 
-/// x¹⁶ + x¹⁴ + x¹³ + x¹² + x¹⁰ + x⁸ + x⁶ + x⁴ + x³ + x + 1, from zero.
+/// x¹⁶ + x¹⁴ + x¹³ + x¹² + x¹⁰ + x⁸ + x⁶ + x⁴ + x³ + x + 1; the initial value is zero.
 const POLYNOMIAL: u16 = 0x755B;
 
-// What a byte does to the CRC, at once and after one to three further zero bytes (crc32.rs says why four tables).
+// Effect of a byte on the CRC, immediately and after one to three further zero bytes (see crc32.rs
+// for the reason for four tables).
 static AT_ONCE: Table = [const { AtomicU16::new(0) }; 256];
 static AFTER_1: Table = [const { AtomicU16::new(0) }; 256];
 static AFTER_2: Table = [const { AtomicU16::new(0) }; 256];
@@ -24,7 +27,7 @@ static FILLED: AtomicBool = AtomicBool::new(false);
 
 type Table = [AtomicU16; 256];
 
-/// As in crc32.rs.
+/// Fills the tables, as in crc32.rs.
 #[cold]
 #[inline(never)]
 fn fill() {
@@ -57,7 +60,7 @@ fn after(crc: u16, bytes: u32) -> u16 {
         ^ AFTER_1[(word >> 24) as usize].load(Ordering::Relaxed)
 }
 
-/// The CRC that a chip sends behind these codes.
+/// The CRC that a chip sends after these codes.
 #[must_use]
 pub fn data_crc(codes: &[i16; CHANNELS]) -> u16 {
     ready();
@@ -67,21 +70,23 @@ pub fn data_crc(codes: &[i16; CHANNELS]) -> u16 {
     })
 }
 
-/// What two chips sent.
+/// Result of [`join`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Joined {
-    /// Scans written: those before the first whose CRC is wrong, and before either slice or the room ends.
+    /// Scans written: those before the first CRC error, and before either input or the output
+    /// buffer ends.
     pub scans: usize,
-    /// Whether any code may be beyond half of the range: its sign and next bit differ.
+    /// Whether any code may be beyond half of the range (its sign bit and the next bit differ).
     pub loud: bool,
 }
 
-/// Whether one scan's CRCs are right, both in one division.
+/// Whether the CRCs of one scan are correct, checked for both chips in one division.
 ///
-/// With A and B what the chips sent, CRC and all, either is a multiple of the polynomial P, and so is x³²·A + B: two words of A, then
-/// the rest of A over B. An error of one chip is found as by its own CRC. So is the same error in both, because x³² + 1 is a
-/// power of x + 1, of which P with its eleven terms is no multiple. Of two different errors in one scan one pair in 65 536
-/// would pass.
+/// Let A and B be the words sent by the chips, CRC included. Each is a multiple of the polynomial
+/// P, and so is x³²·A + B: two words of A, then the rest of A combined with B. An error in one
+/// chip's data is detected as by its own CRC. The same error in both is detected too, because x³² +
+/// 1 is a power of x + 1, and P, with its eleven terms, is not a multiple of x + 1. Of pairs of
+/// different errors in one scan, one in 65 536 would go undetected.
 #[inline(always)]
 fn right(a: &[u8; CHIP_BYTES], b: &[u8; CHIP_BYTES]) -> bool {
     let [a_codes @ .., a_low, a_high] = a;
@@ -95,7 +100,7 @@ fn right(a: &[u8; CHIP_BYTES], b: &[u8; CHIP_BYTES]) -> bool {
     crc == u16::from_le_bytes([*b_low, *b_high])
 }
 
-/// Scans before the first that is not right.
+/// Number of scans before the first CRC error.
 #[inline(never)]
 fn good(first: &[[u8; CHIP_BYTES]], second: &[[u8; CHIP_BYTES]]) -> usize {
     ready();
@@ -109,7 +114,8 @@ fn good(first: &[[u8; CHIP_BYTES]], second: &[[u8; CHIP_BYTES]]) -> usize {
     count
 }
 
-/// Copies one chip's codes; bits 15 and 31 tell whether one is beyond half of the range.
+/// Copies one chip's codes. Bits 15 and 31 of the result are set if a code may be beyond half of
+/// the range.
 #[inline(always)]
 fn copied(chip: &[u8; CHIP_BYTES], to: &mut [u8]) -> u32 {
     let mut loud = 0;
@@ -121,7 +127,8 @@ fn copied(chip: &[u8; CHIP_BYTES], to: &mut [u8]) -> u32 {
     loud
 }
 
-/// Writes the scans of two chips, `channels` (at most 16) of each: the first chip's, then the second's.
+/// Writes the scans of two chips with `channels` (at most 16) channels in total: those of the first
+/// chip, then those of the second.
 #[inline(never)]
 pub fn join(
     first: &[[u8; CHIP_BYTES]],
@@ -141,10 +148,10 @@ pub fn join(
             one.copy_from_slice(&a[..ours]);
             two.copy_from_slice(&b[..theirs]);
         }
-        // somebody else may look
+        // amplitude not checked here: report `loud`, so that the caller checks
         return Joined { scans: good, loud: true };
     }
-    // of a length known beforehand, which is the usual and the costly case
+    // full scans of constant length: the usual case, and the one whose cost matters
     let mut loud = 0;
     for ((a, b), scan) in chips.zip(scans.as_chunks_mut::<{ 2 * CODES }>().0) {
         let (one, two) = scan.split_at_mut(CODES);
@@ -158,7 +165,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The polynomial division, bit by bit, as the data sheet describes it.
+    /// Polynomial division bit by bit, as the data sheet describes it.
     fn by_hand(codes: &[i16; CHANNELS]) -> u16 {
         let bytes = codes.iter().flat_map(|code| code.to_be_bytes());
         let bits = bytes.flat_map(|byte| (0..8).rev().map(move |i| byte >> i & 1));
@@ -218,7 +225,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever happens to one chip's words, or the same to both: what its own CRC would find is found.
+        /// Whatever error affects one chip's words, or both chips' words equally: it is detected if
+        /// the chip's own CRC would detect it.
         #[test]
         fn errors_are_found_as_by_each_chips_own_crc(
             codes in any::<[[i16; CHANNELS]; 2]>(),

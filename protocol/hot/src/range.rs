@@ -1,6 +1,6 @@
-//! Whether a code is at either end of its converter's range.
+//! Detects codes at either end of the converter's range.
 
-/// Whether any code is.
+/// Whether any code is at either end of the range.
 #[must_use]
 pub fn is_over(codes: &[[u8; 2]]) -> bool {
     codes.iter().any(|pair| matches!(i16::from_le_bytes(*pair), i16::MAX | i16::MIN))

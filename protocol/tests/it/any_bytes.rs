@@ -1,4 +1,4 @@
-//! Any bytes at all: no panic, bounded work, and back in step at the next frame.
+//! Arbitrary input: no panic, bounded work, and resynchronisation at the next frame.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_protocol::frame::{Accumulator, FrameError, Kind, encode};
@@ -6,7 +6,7 @@ use jointrig_protocol::limits::{MAX_FRAME, MAX_WIRE};
 use jointrig_protocol::{acknowledge, answer, block, event, hello, request};
 use proptest::prelude::*;
 
-/// Feeds `bytes` in pieces of `step`, and returns what was found.
+/// Feeds `bytes` in pieces of `step`, and returns the frames and errors found.
 fn found(bytes: &[u8], step: usize) -> Vec<Result<(Kind, Vec<u8>), FrameError>> {
     let mut accumulator = Accumulator::new();
     let mut out = Vec::new();
@@ -55,8 +55,8 @@ proptest! {
         wire[at] ^= flip;
         wire.push(0);
         for frame in found(&wire, wire.len()) {
-            // CRC-32 finds every error burst of up to 32 bits; what a zero in the middle splits off is
-            // shorter than a frame can be, or fails its CRC too
+            // CRC-32 detects every error burst of up to 32 bits; a fragment split off by a zero in
+            // the middle is shorter than a frame can be, or fails its CRC as well
             prop_assert!(frame.is_err() || frame == Ok((Kind::Answer, payload.clone())));
         }
     }
@@ -76,7 +76,7 @@ proptest! {
 
 #[test]
 fn the_tail_of_an_oversized_frame_is_not_a_frame() {
-    // a good frame hidden behind more bytes than a frame can have, with no zero between
+    // a good frame appended to more bytes than a frame can have, without a zero in between
     let mut bytes = vec![1; 2 * MAX_WIRE];
     bytes.extend(framed(Kind::Log, b"hidden"));
     bytes.extend(framed(Kind::Log, b"next"));

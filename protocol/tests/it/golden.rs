@@ -1,4 +1,4 @@
-//! The committed frames are what the code writes, and decode to what was written.
+//! The committed frames match what the code writes, and they decode.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_protocol::frame::Kind;

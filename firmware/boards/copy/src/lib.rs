@@ -1,16 +1,17 @@
 //! `memcpy` for the Cortex-M33.
 //!
-//! Rust's own is portable and takes four instructions a word; every block of samples is copied four times
-//! on its way. This one moves eight words in two instructions when both sides are aligned, and uses the
-//! core's unaligned loads and stores when they are not. A board brings it in by naming this crate.
+//! Rust's own version is portable and takes four instructions per word; every block of samples is
+//! copied four times on its way. This version moves eight words in two instructions when both
+//! addresses are aligned, and uses the core's unaligned loads and stores when they are not. A board
+//! includes it by naming this crate.
 #![no_std]
 
 use core::arch::global_asm;
 
 // The linker prefers these definitions to the weak ones of the compiler's library. They follow the
-// procedure call standard: r0 to r3 and r12 are free, all else is restored; `memcpy` returns r0.
-// Loads and stores of single words and halves may be unaligned on this core; multiple ones may not, and
-// are used only when both addresses are multiples of four.
+// procedure call standard: r0 to r3 and r12 may be changed, all other registers are restored;
+// `memcpy` returns r0. Loads and stores of single words and half-words may be unaligned on this
+// core. Multiple ones may not, and are used only on addresses that are multiples of four.
 global_asm!(
     ".section .text.memcpy,\"ax\",%progbits",
     ".global memcpy",
@@ -42,7 +43,7 @@ global_asm!(
     "bhs 1b",
     "pop {{r4-r10}}",
     "b 4f",
-    // only the destination is not aligned: eight words at once from where they are
+    // only the destination is unaligned: load eight words in one instruction and store them singly
     "2: lsls r3, r1, #30",
     "bne 9f",
     "push {{r4-r10}}",
@@ -81,14 +82,14 @@ global_asm!(
     "subs r2, #32",
     "bhs 3b",
     "pop {{r4-r6}}",
-    // fewer than 32 bytes are left: r2 is their number less 32
+    // fewer than 32 bytes remain: r2 is their number minus 32
     "4: adds r2, #28",
     "bmi 6f",
     "5: ldr r3, [r1], #4",
     "str r3, [r12], #4",
     "subs r2, #4",
     "bpl 5b",
-    // fewer than four: the two low bits of r2 are still those of their number
+    // fewer than four bytes remain: the two low bits of r2 still equal those of their number
     "6: lsls r3, r2, #31",
     "bpl 7f",
     "ldrb r3, [r1], #1",

@@ -1,12 +1,12 @@
-//! The logger of a board: each line is encoded once, and goes whole to two places.
+//! The logger of a board: each line is encoded once and passed as a whole to two destinations.
 //!
-//! One is [`TAP`], from which the firmware's transmitter takes lines for the host; the other is whatever the
-//! board names in [`also_to`] (a debug probe, the simulator's memory). A line is gathered in full before it is
-//! handed over, so that neither ever sees half of one, and one that is longer than a frame of the link is
-//! dropped by both.
+//! One is [`TAP`], from which the firmware's transmitter takes lines for the host; the other is the
+//! function that the board sets with [`also_to`] (a debug probe, the simulator's memory). A line is
+//! completed before it is passed on, so that neither destination receives a partial line; a line
+//! longer than a frame of the link is dropped for both.
 //!
-//! Interrupts are off while a line is put together, as with any defmt logger on one core: about a thousand
-//! instructions for a line, none without one.
+//! Interrupts are disabled while a line is encoded, as with any defmt logger on a single core:
+//! about a thousand instructions per line, none without a line.
 #![no_std]
 
 use core::cell::{Cell, RefCell};
@@ -16,40 +16,41 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
 use jointrig_firmware::logs::{LINE_BYTES, Tap};
 
-/// Lines for the host: give it to [`jointrig_firmware::Core::with_logs`].
+/// Lines for the host; pass it to [`jointrig_firmware::Core::with_logs`].
 pub static TAP: Tap<CriticalSectionRawMutex> = Tap::new();
 
-/// Takes one encoded line; called with interrupts off.
+/// Takes one encoded line; called with interrupts disabled.
 pub type Place = fn(&[u8]);
 
 static ALSO: Mutex<Cell<Option<Place>>> = Mutex::new(Cell::new(None));
 
-/// From here on, lines also go to `place`.
+/// Sends lines to `place` as well from now on.
 pub fn also_to(place: Place) {
     critical_section::with(|free| ALSO.borrow(free).set(Some(place)));
 }
 
-/// The build id of this image: the first eight bytes of the hash that the linker wrote into it. A host finds
-/// the table of log strings by it.
+/// The build id of this image: the first eight bytes of the hash that the linker wrote into it. A
+/// host uses it to find the table of log strings.
 #[must_use]
 pub fn build_id() -> u64 {
     unsafe extern "C" {
         static __jointrig_build_id: [u8; 24];
     }
-    // SAFETY: build-id.x, with which every board links, puts the symbol where the linker's note begins: a
-    // header of 16 bytes, and then the 20 of a SHA-1. It lies in flash, and nothing writes there.
+    // SAFETY: build-id.x, with which every board is linked, places the symbol at the start of the
+    // linker's note: a header of 16 bytes, followed by the 20 bytes of a SHA-1. It is in flash and
+    // never written.
     let note = unsafe { &__jointrig_build_id };
     let [.., a, b, c, d, e, f, g, h] = *note;
     u64::from_be_bytes([a, b, c, d, e, f, g, h])
 }
 
-/// The line that is being put together.
+/// The line being encoded.
 struct Line {
     encoder: defmt::Encoder,
     bytes: Vec<u8, LINE_BYTES>,
-    /// It has outgrown the room.
+    /// It exceeded the buffer.
     too_long: bool,
-    /// What the interrupts were before it, while there is one.
+    /// Interrupt state before the line, while there is one.
     before: Option<RestoreState>,
 }
 
@@ -68,7 +69,7 @@ impl Line {
 
     fn hand_over(&mut self, free: CriticalSection<'_>) {
         if self.too_long {
-            // no line at all is what the tap counts as one that was dropped
+            // the tap counts an empty line as a dropped one
             TAP.push(&[]);
         } else {
             TAP.push(&self.bytes);
@@ -84,11 +85,12 @@ impl Line {
 #[defmt::global_logger]
 struct Logger;
 
-// SAFETY: `acquire` turns interrupts off on the one core and `release` restores them, so that nobody else logs
-// between the two; a line begun inside another one (by a `Format` that logs) panics.
+// SAFETY: `acquire` disables interrupts on the single core and `release` restores them, so that
+// nothing else logs in between; a line begun inside another one (by a `Format` that logs) panics.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        // SAFETY: released by `release`, which defmt calls after every `acquire`, nested as it was acquired.
+        // SAFETY: released by `release`, which defmt calls after every `acquire`, with the same
+        // nesting.
         let before = unsafe { critical_section::acquire() };
         critical_section::with(|free| {
             let mut line = LINE.borrow_ref_mut(free);
@@ -108,7 +110,7 @@ unsafe impl defmt::Logger for Logger {
             line.before.take()
         });
         if let Some(before) = before {
-            // SAFETY: this is what `acquire` was given, and it is given back once.
+            // SAFETY: this is the value that `acquire` received, and it is restored once.
             unsafe { critical_section::release(before) }
         }
     }

@@ -1,4 +1,4 @@
-//! The device: the firmware's four functions as tasks over this board's parts.
+//! The device: the firmware's four functions as tasks with this board's parts.
 
 use heapless::{String, Vec};
 use jointrig_firmware::board::{self, Board};
@@ -13,13 +13,13 @@ use static_cell::{ConstStaticCell, StaticCell};
 use crate::executor;
 use crate::parts::{Coil, Drive, Emulated, Inputs, Scans, Sink, Source, Stage};
 
-/// A second of sixteen channels at 51.2 kHz.
+/// Blocks in the ring: a second of sixteen channels at 51.2 kHz.
 const SLOTS: usize = 3_414;
 
-/// What the tasks share.
+/// State shared by the tasks.
 pub type Shared = Core<'static, <Emulated as Board>::Mutex>;
 
-/// Runs the firmware for ever.
+/// Runs the firmware forever.
 ///
 /// # Panics
 /// A set-up without channels, or a second call.

@@ -1,4 +1,5 @@
-//! Running the tasks: embassy's executor, and a turn to whoever serves the board when all of them wait.
+//! Runs the tasks with embassy's executor, and passes the turn to the simulator when all of them
+//! wait.
 
 use core::ptr;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -11,21 +12,23 @@ use crate::{port, time};
 
 static WOKEN: AtomicBool = AtomicBool::new(false);
 
-/// embassy's executor calls this when one of its tasks was woken.
-// SAFETY: the one definition of this symbol in the image; embassy declares it with this signature.
+/// Called by embassy's executor when one of its tasks was woken.
+// SAFETY: this is the only definition of the symbol in the image; embassy declares it with this
+// signature.
 #[unsafe(export_name = "__pender")]
 fn pender(_context: *mut ()) {
     WOKEN.store(true, Ordering::Release);
 }
 
-/// Makes the tasks and runs them for ever.
+/// Creates the tasks and runs them forever.
 pub fn run(tasks: impl FnOnce(Spawner)) -> ! {
     static EXECUTOR: StaticCell<Executor> = StaticCell::new();
     let executor: &'static Executor = EXECUTOR.init(Executor::new(ptr::null_mut()));
     tasks(executor.spawner());
     loop {
         while WOKEN.swap(false, Ordering::AcqRel) {
-            // SAFETY: this is the only place that polls the only executor, and no task reaches it.
+            // SAFETY: this is the only place that polls the only executor, and no task can reach
+            // it.
             unsafe { executor.poll() }
         }
         let alarm_us = time::next_alarm();

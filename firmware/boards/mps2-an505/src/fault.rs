@@ -1,4 +1,4 @@
-//! The ends that are not meant to happen: a panic or a processor fault is reported, and QEMU ends with 101.
+//! Abnormal ends: a panic or a processor fault is reported, and QEMU exits with code 101.
 
 use core::fmt::Write;
 use core::panic::PanicInfo;
@@ -11,13 +11,13 @@ use semihosting::{eprintln, process};
 
 use crate::memory;
 
-/// The exit code of a firmware that broke down.
+/// The exit code after a failure of the firmware.
 const BROKEN: i32 = 101;
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     let mut sentence = String::<512>::new();
-    // what does not fit is left out
+    // text that does not fit is dropped
     let _ = write!(sentence, "{info}");
     report(&sentence)
 }
@@ -35,7 +35,7 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     report(&sentence)
 }
 
-/// For tests: ends in a fault of the processor, by the stack or by a read.
+/// For tests: ends with a processor fault, by stack overflow or by an invalid read.
 #[cold]
 #[inline(never)]
 pub fn end_by(overflow: bool) {
@@ -46,16 +46,17 @@ pub fn end_by(overflow: bool) {
     }
 }
 
-/// For tests: reads where no memory is.
+/// For tests: reads an address without memory.
 fn read_nowhere() {
-    // SAFETY: there is nothing to disturb; the read ends in the fault that is wanted.
+    // SAFETY: no memory is affected; the read causes the intended fault.
     let _ = unsafe { core::ptr::read_volatile(0x7000_0000 as *const u32) };
 }
 
-/// For tests: calls itself until little of the stack is left, then a function that needs more than that.
+/// For tests: recurses until little stack is left, then calls a function that needs more.
 #[inline(never)]
 fn recurse(depth: u32) -> u32 {
-    /// More than the frame of a fault, so that the handler can begin; less than what [`greedy`] takes.
+    /// More than the frame of a fault, so that the handler can start; less than what [`greedy`]
+    /// uses.
     const LEFT: usize = 6 * 1024;
     let frame = core::hint::black_box([depth; 256]);
     let here = (&raw const frame).addr();
@@ -69,14 +70,15 @@ fn greedy(seed: u32) -> u32 {
     core::hint::black_box([seed; 4096])[4095]
 }
 
-/// The port itself may be what broke, so this goes straight to the memory and the pipe.
+/// Reports the message. The port itself may have failed, so this accesses the memory and the pipe
+/// directly.
 fn report(sentence: &str) -> ! {
     if memory::is_served() {
         let length = memory::write_text(sentence.as_bytes());
         let last = Ask { op: Op::Panic as u32, argument: length, ..Ask::NOTHING };
         memory::write_ask(&last.to_words());
         if let Ok(mut pipe) = semihosting::io::stdout() {
-            // the simulator hears of the end in any case, by the pipe's
+            // the simulator detects the end in any case, by the closed pipe
             let _ = pipe.write_all(&[1]);
         }
     } else {

@@ -1,12 +1,13 @@
-//! The emulated target: the controller's firmware as a binary for the Cortex-M33, under QEMU's mps2-an505.
+//! The emulated target: the controller's firmware as a binary for the Cortex-M33, on QEMU's
+//! mps2-an505.
 //!
-//! What a wired board does with its peripherals, this one does through memory that it shares with the
-//! simulator, in turns ([`jointrig_firmware::lockstep`]): converters, coil, inputs, stage and link are the
-//! parts in [`parts`], and [`port`] is where turns are taken. Time is what the simulator says ([`time`]), so
-//! the machine's speed enters nothing.
+//! Where a wired board uses its peripherals, this one uses memory shared with the simulator, in
+//! turns ([`jointrig_firmware::lockstep`]): converters, coil, inputs, stage and link are the parts
+//! in [`parts`], and [`port`] takes the turns. Time is set by the simulator ([`time`]), so the
+//! speed of the PC has no effect.
 //!
-//! Two images are made of it. `mps2-an505` is the board, and nothing else; `mps2-checks` has what only its makers
-//! ask of it: the golden vectors of the wire and the benchmark.
+//! The crate builds two images. `mps2-an505` contains only the board; `mps2-checks` contains checks
+//! for developers: the golden vectors of the protocol and the benchmark.
 #![no_std]
 
 pub mod device;

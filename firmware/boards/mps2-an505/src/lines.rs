@@ -1,12 +1,14 @@
-//! Log lines for the simulator: encoded, in a ring of the shared memory, dropped whole when it is full.
+//! Log lines for the simulator: encoded, in a ring of the shared memory; a line that does not fit
+//! is dropped as a whole.
 //!
-//! They reach it at the next turn, whatever the link does: what is said before a host comes and before a panic.
+//! The simulator receives them at the next turn, independently of the link, including lines from
+//! before a host connects and before a panic.
 
 use jointrig_firmware::lockstep::{LOG_AT, RING_BYTES};
 
 use crate::{memory, port};
 
-/// From here on, log lines reach the simulator.
+/// Sends log lines to the simulator from now on.
 pub fn start() {
     jointrig_board_log::also_to(put);
 }

@@ -1,5 +1,5 @@
-//! The board: the firmware for a simulator, which starts QEMU itself. The image's arguments are `serve` and, for a link
-//! over UART 0, `uart`.
+//! The board: the firmware for a simulator, which starts QEMU itself. The image's arguments are
+//! `serve` and, for a link over UART 0, `uart`.
 #![no_std]
 #![no_main]
 
@@ -10,7 +10,7 @@ use semihosting::{eprintln, process};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     jointrig_board_fault::limit_stack();
-    // a command line that cannot be read is treated as none
+    // an unreadable command line is treated as empty
     let words = args::<256>().ok();
     let mut words = words.as_ref().into_iter().flatten();
     if words.next() != Some(Ok("serve")) {

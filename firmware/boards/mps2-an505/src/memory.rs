@@ -6,42 +6,43 @@ use jointrig_firmware::lockstep::{
     ASK_AT, BASE, BYTES, MAGIC, MAGIC_AT, REPLY_AT, RING_BYTES, TEXT_AT, TEXT_BYTES, WORDS,
 };
 
-/// Whether a simulator of this build's layout serves the memory.
+/// Whether a simulator with the same memory layout serves the memory.
 pub fn is_served() -> bool {
     let mut word = [0; 4];
     read(MAGIC_AT, &mut word);
     u32::from_le_bytes(word) == MAGIC
 }
 
-/// Copies bytes out.
+/// Copies bytes from the shared memory.
 ///
 /// # Panics
 /// Outside the shared memory.
 pub fn read(at: usize, out: &mut [u8]) {
     assert!(at <= BYTES && out.len() <= BYTES - at, "outside the shared memory");
-    // SAFETY: the range lies within the 16 MB at BASE, which is plain memory of this machine, aligned for
-    // bytes and disjoint from all that the linker placed, so no Rust object is there. The simulator writes
-    // only while this core stands still in a semihosting call, which the compiler must assume to touch it.
+    // SAFETY: the range lies within the 16 MB at BASE, which is plain memory of this machine,
+    // aligned for bytes and disjoint from everything that the linker placed, so it contains no Rust
+    // object. The simulator writes only while this core is halted in a semihosting call, which the
+    // compiler must assume to access the memory.
     unsafe { ptr::copy_nonoverlapping((BASE + at) as *const u8, out.as_mut_ptr(), out.len()) }
 }
 
-/// What the simulator has written, where it is: valid until this side gives up its turn.
+/// Passes the simulator's data to `f` without a copy; they are valid until this side ends its turn.
 ///
 /// # Panics
 /// Outside the shared memory.
 pub fn look<R>(at: usize, length: usize, f: impl FnOnce(&[u8]) -> R) -> R {
     assert!(at <= BYTES && length <= BYTES - at, "outside the shared memory");
-    // SAFETY: as in `read`; `f` takes no turn, so that nobody writes while the bytes are borrowed.
+    // SAFETY: as in `read`; `f` takes no turn, so that nothing writes while the bytes are borrowed.
     f(unsafe { core::slice::from_raw_parts((BASE + at) as *const u8, length) })
 }
 
-/// Copies bytes in.
+/// Copies bytes to the shared memory.
 ///
 /// # Panics
 /// Outside the shared memory.
 pub fn write(at: usize, bytes: &[u8]) {
     assert!(at <= BYTES && bytes.len() <= BYTES - at, "outside the shared memory");
-    // SAFETY: as in `read`; nobody else writes during this core's turn.
+    // SAFETY: as in `read`; nothing else writes during this core's turn.
     unsafe { ptr::copy_nonoverlapping(bytes.as_ptr(), (BASE + at) as *mut u8, bytes.len()) }
 }
 
@@ -63,14 +64,14 @@ pub fn read_reply() -> [u32; WORDS] {
     })
 }
 
-/// Writes a message and returns how much of it fitted.
+/// Writes a message and returns the length written, which may be truncated.
 pub fn write_text(text: &[u8]) -> u32 {
     let length = text.len().min(TEXT_BYTES);
     write(TEXT_AT, &text[..length]);
     length as u32
 }
 
-/// Copies out of a ring from a count of bytes on.
+/// Copies from a ring, starting at a byte count.
 pub fn read_ring(ring: usize, from: u32, out: &mut [u8]) {
     let at = from % RING_BYTES;
     let first = out.len().min((RING_BYTES - at) as usize);
@@ -79,7 +80,7 @@ pub fn read_ring(ring: usize, from: u32, out: &mut [u8]) {
     read(ring, rest);
 }
 
-/// Copies into a ring from a count of bytes on.
+/// Copies into a ring, starting at a byte count.
 pub fn write_ring(ring: usize, from: u32, bytes: &[u8]) {
     let at = from % RING_BYTES;
     let first = bytes.len().min((RING_BYTES - at) as usize);

@@ -1,4 +1,4 @@
-//! The board's parts, as the firmware's contract asks for them, through the shared memory.
+//! The board's parts, implementing the firmware's traits with the shared memory.
 
 use core::future::poll_fn;
 use core::task::Poll;
@@ -26,10 +26,11 @@ use jointrig_protocol::sync::{Clock, ClockFault};
 use crate::device::Shared;
 use crate::{fault, memory, port, uart};
 
-/// Most scans of a block: those of ten channels, the fewest that take two chips and a half.
+/// Most scans of a block: those of ten channels, which fill the block area of the shared memory (32
+/// bytes of header and 24 scans of 36 bytes).
 const MOST_SCANS: usize = 24;
 
-/// The emulated board: a name for its parts.
+/// The emulated board; it names the types of its parts.
 pub enum Emulated {}
 
 impl board::Board for Emulated {
@@ -43,26 +44,27 @@ impl board::Board for Emulated {
     type Stage = Stage;
 }
 
-/// Converters whose words the simulator delivers.
+/// Converters whose words are delivered by the simulator.
 pub struct Scans {
     core: &'static Shared,
     reader: Reader,
     per_block: usize,
     rate_hz: u32,
-    /// The instant at which the block that is due is complete: µs, and a part of one more in parts of the scan rate.
+    /// The instant at which the next block is complete: whole µs, and a fraction of a further µs in
+    /// units of 1 / scan rate.
     due: (u64, u32),
     blocks: u32,
-    /// The rings are to be started.
+    /// The rings must be restarted.
     join: bool,
     last_report: Option<Trouble>,
-    /// What came to the sync port with the last block.
+    /// Activity at the sync port during the last block.
     seen: Option<Seen>,
-    /// Periods of the clock that have begun.
+    /// Periods of the clock begun so far.
     periods: u32,
 }
 
 impl Scans {
-    /// Converters that deliver so many scans a block, of so many channels.
+    /// Converters that deliver `per_block` scans per block, with `channels` channels.
     pub fn new(core: &'static Shared, per_block: usize, channels: usize, rate_hz: u32) -> Self {
         let alignment = Alignment { clock: CLOCK, block_scans: per_block as u32, blocks: RING_BLOCKS };
         let reader = Reader::new(alignment, channels, 0);
@@ -80,7 +82,7 @@ impl Scans {
         }
     }
 
-    /// Waits until the simulator has delivered.
+    /// Waits until the simulator has delivered a block.
     async fn delivered(&mut self) -> u32 {
         let at_us = self.due.0 + u64::from(self.due.1 > 0);
         poll_fn(|context| {
@@ -98,7 +100,8 @@ impl Scans {
         .await
     }
 
-    /// By how many scans what was delivered or reported missing is behind the clock, as a number to be added to what is told from there.
+    /// Period of the next scan to be delivered or reported missing, relative to the clock's count
+    /// of periods; added to instants that the simulator gives relative to that count.
     fn behind(&self) -> i32 {
         self.reader.next_period().wrapping_sub(self.periods).cast_signed()
     }
@@ -191,7 +194,7 @@ impl board::Scans for Scans {
     }
 }
 
-/// The coil of the simulated hammer, which ends any pulse at the cap by itself.
+/// The coil of the simulated hammer, which itself ends any pulse at the cap.
 pub struct Coil;
 
 impl board::Coil for Coil {
@@ -231,7 +234,7 @@ impl board::Drive for Drive {
     }
 }
 
-/// Guard and emergency stop of the simulated rig, as they were when the guard was last looked at.
+/// Guard and emergency stop of the simulated rig, as of the last reading of the guard.
 #[derive(Default)]
 pub struct Inputs(u32);
 
@@ -239,7 +242,7 @@ impl board::Inputs for Inputs {
     fn interlock_closed(&mut self) -> bool {
         self.0 = port::with(|port| {
             let inputs = port.reply.inputs;
-            // a turn of the key counts once, as do slow values
+            // a turn of the key is reported once, and so are slow values
             port.reply.inputs &= !(LOCAL_RESET | SLOW_MEASURED);
             inputs
         });
@@ -268,7 +271,7 @@ impl board::Inputs for Inputs {
 /// Bytes from the host.
 #[derive(Default)]
 pub struct Source {
-    /// How often the link was cut, as far as the firmware was told.
+    /// Number of link cuts reported to the firmware.
     cuts: u32,
 }
 
@@ -277,7 +280,7 @@ impl board::ByteSource for Source {
         poll_fn(|context| {
             port::with(|port| {
                 if uart::is_link() {
-                    // looked at again after every turn
+                    // polled again after every turn
                     port.bytes.register(context.waker());
                     return match uart::take(buffer) {
                         0 => Poll::Pending,
@@ -340,7 +343,7 @@ impl board::ByteSink for Sink {
     }
 }
 
-/// The simulator moves hammer and laser.
+/// The simulator positions hammer and laser.
 pub struct Stage;
 
 impl board::Stage for Stage {
@@ -363,6 +366,6 @@ impl board::Stage for Stage {
 }
 
 fn refusal(sentence: &str) -> Refusal {
-    // the sentences here are shorter than what fits
+    // the messages used here fit
     Refusal::Stage(String::try_from(sentence).unwrap_or_default())
 }

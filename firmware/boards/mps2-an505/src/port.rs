@@ -1,4 +1,4 @@
-//! Taking turns with whoever serves this board, and what both sides have said last.
+//! Taking turns with the server of this board; holds the last messages of both sides.
 
 use core::cell::{Cell, RefCell};
 
@@ -14,19 +14,19 @@ use crate::memory;
 
 /// The board's side of the port.
 pub struct Port {
-    /// What will be said at the next turn.
+    /// The message for the next turn.
     pub ask: Ask,
-    /// What was answered last.
+    /// The last reply.
     pub reply: Reply,
-    /// The acquisition task.
+    /// Waker of the acquisition task.
     pub block: WakerRegistration,
-    /// The receiving task.
+    /// Waker of the receiving task.
     pub bytes: WakerRegistration,
-    /// The transmitting task.
+    /// Waker of the transmitting task.
     pub room: WakerRegistration,
 }
 
-/// Who serves the board: takes an ask, gives a reply.
+/// A server of the board: takes an ask, returns a reply.
 pub type Server = fn(&Ask) -> Reply;
 
 static PORT: Mutex<CriticalSectionRawMutex, RefCell<Port>> = Mutex::new(RefCell::new(Port {
@@ -49,17 +49,17 @@ static PORT: Mutex<CriticalSectionRawMutex, RefCell<Port>> = Mutex::new(RefCell:
 
 static SERVER: Mutex<CriticalSectionRawMutex, Cell<Server>> = Mutex::new(Cell::new(simulator));
 
-/// Chooses who serves the board.
+/// Selects the server of the board.
 pub fn serve_by(server: Server) {
     SERVER.lock(|cell| cell.set(server));
 }
 
-/// The port, for a moment.
+/// Gives access to the port within a critical section.
 pub fn with<R>(f: impl FnOnce(&mut Port) -> R) -> R {
     PORT.lock(|port| f(&mut port.borrow_mut()))
 }
 
-/// One turn: says what the board wants, and returns when it is this side's turn again.
+/// One turn: requests an operation, and returns when it is this side's turn again.
 pub fn turn(op: Op, argument: u32) -> Reply {
     let server = SERVER.lock(Cell::get);
     with(|port| {
@@ -70,7 +70,7 @@ pub fn turn(op: Op, argument: u32) -> Reply {
     })
 }
 
-/// All tasks wait: lets time go on, and wakes those whose event has come.
+/// All tasks wait: passes the turn, and wakes the tasks whose event has occurred.
 pub fn idle(alarm_us: u64) {
     let server = SERVER.lock(Cell::get);
     let by_uart = crate::uart::is_link();
@@ -93,7 +93,8 @@ pub fn idle(alarm_us: u64) {
     crate::time::set(now_us);
 }
 
-/// Serves by the simulator: a byte on the standard output rings, a byte on the standard input answers.
+/// Uses the simulator as the server: a byte on the standard output passes the turn, a byte on the
+/// standard input returns it.
 pub fn simulator(ask: &Ask) -> Reply {
     static PIPES: Mutex<CriticalSectionRawMutex, RefCell<Option<(Stdin, Stdout)>>> =
         Mutex::new(RefCell::new(None));
@@ -109,13 +110,13 @@ pub fn simulator(ask: &Ask) -> Reply {
         input.read(&mut byte).ok().filter(|count| *count == 1)
     });
     if answered.is_none() {
-        // the simulator has gone, and this board with it
+        // the simulator has exited, so the board does too
         process::exit(0)
     }
     Reply::from_words(&memory::read_reply())
 }
 
-/// Introduces the board and hears what it is to be.
+/// Announces the board and returns its set-up.
 pub fn set_up() -> Setup {
     let reply = turn(Op::Start, schema::HASH as u32);
     let mut text = [0; TEXT_BYTES];

@@ -1,4 +1,4 @@
-//! Time as the simulator tells it: embassy's time driver without a timer.
+//! Time as set by the simulator: embassy's time driver without a timer.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -19,7 +19,7 @@ impl Driver for ToldTime {
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
-        // the next alarm is asked for whenever all tasks wait
+        // the next alarm is queried whenever all tasks wait
         self.alarms.lock(|alarms| alarms.borrow_mut().schedule_wake(at, waker));
     }
 }
@@ -29,7 +29,7 @@ time_driver_impl!(static DRIVER: ToldTime = ToldTime {
     alarms: Mutex::new(RefCell::new(Queue::new())),
 });
 
-/// Sets the time; it never runs backwards.
+/// Sets the time; it never goes backwards.
 pub fn set(now_us: u64) {
     DRIVER.now_us.lock(|now| now.set(now.get().max(now_us)));
 }

@@ -1,7 +1,8 @@
-//! The plain way to the host: UART 0 of the board, byte by byte.
+//! The direct link to the host: UART 0 of the board, byte by byte.
 //!
-//! QEMU connects it to whatever its `-serial` names. Bytes then come in the host's time, not in the simulator's, so a
-//! run over it is not repeatable; the shared ring is for that.
+//! QEMU connects it to the target of its `-serial` option. Bytes then arrive in the host's real
+//! time, not in the simulator's time, so a run over it is not repeatable; use the shared ring for
+//! repeatable runs.
 
 use core::ptr;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -12,21 +13,22 @@ const DATA: usize = 0x00;
 const STATE: usize = 0x04;
 const CONTROL: usize = 0x08;
 const DIVISOR: usize = 0x10;
-/// STATE: a byte waits to leave.
+/// STATE: a byte waits to be sent.
 const FULL_OUT: u32 = 1;
-/// STATE: a byte has come.
+/// STATE: a byte was received.
 const FULL_IN: u32 = 2;
-/// CONTROL: both directions on.
+/// CONTROL: both directions enabled.
 const BOTH_ON: u32 = 3;
-/// The smallest divisor: QEMU sends at once whatever it is.
+/// The smallest divisor: QEMU sends immediately for any value.
 const FASTEST: u32 = 16;
-/// Looks at STATE before an empty line is believed: QEMU brings the next byte a moment after the last was taken.
+/// Reads of STATE before the line counts as empty: QEMU provides the next byte shortly after the
+/// last was taken.
 const LOOKS: u32 = 64;
 
 static IN_USE: AtomicBool = AtomicBool::new(false);
 
 fn read(register: usize) -> u32 {
-    // SAFETY: a register of a device of this machine, aligned, and used by this file alone.
+    // SAFETY: an aligned register of a device of this machine, used only by this file.
     unsafe { ptr::read_volatile((BASE + register) as *const u32) }
 }
 
@@ -35,19 +37,19 @@ fn write(register: usize, value: u32) {
     unsafe { ptr::write_volatile((BASE + register) as *mut u32, value) }
 }
 
-/// Makes it the link.
+/// Uses the UART as the link.
 pub fn start() {
     write(DIVISOR, FASTEST);
     write(CONTROL, BOTH_ON);
     IN_USE.store(true, Ordering::Relaxed);
 }
 
-/// Whether it is the link.
+/// Whether the UART is the link.
 pub fn is_link() -> bool {
     IN_USE.load(Ordering::Relaxed)
 }
 
-/// Takes what has come; how many bytes.
+/// Reads the received bytes and returns their number.
 pub fn take(buffer: &mut [u8]) -> usize {
     let mut count = 0;
     let mut looks = 0;
@@ -63,7 +65,7 @@ pub fn take(buffer: &mut [u8]) -> usize {
     count
 }
 
-/// Gives as many bytes as it takes now; how many.
+/// Sends as many bytes as the UART accepts now and returns their number.
 pub fn give(bytes: &[u8]) -> usize {
     for (count, byte) in bytes.iter().enumerate() {
         if read(STATE) & FULL_OUT != 0 {

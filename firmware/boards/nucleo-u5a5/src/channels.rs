@@ -1,4 +1,5 @@
-//! The channels of a scan, in the order of the converters' inputs: docs/WIRING.md has the sockets.
+//! The channels of a scan, in the order of the converters' inputs; the sockets are listed in
+//! docs/WIRING.md.
 
 use heapless::String;
 use jointrig_firmware::ad7606b::part::AD7606B;
@@ -8,15 +9,16 @@ use static_cell::StaticCell;
 
 use crate::chips::SETTINGS;
 
-/// One input: name, role, quantity, SI units per volt (sign included), delay of the sensor's electronics in ns.
+/// One input: name, role, quantity, SI units per volt (sign included), delay of the sensor's
+/// electronics in ns.
 type Input = (&'static str, Role, Quantity, f32, u32);
 
-/// Place of the hammer's force.
+/// Index of the hammer's force channel.
 pub const FORCE: u8 = 0;
-/// Place of the shaker's force.
+/// Index of the shaker's force channel.
 pub const EXCITATION: u8 = 9;
 
-/// What the rig has; the six inputs behind it are free.
+/// The channels of the rig; the last six inputs are free.
 const INPUTS: [Input; MAX_CHANNELS] = [
     ("force", Role::HammerForce, Quantity::Force, 44.643, 0),
     ("vib_x", Role::Response(Axis::X), Quantity::Velocity, 0.005, 0),
@@ -36,8 +38,8 @@ const INPUTS: [Input; MAX_CHANNELS] = [
     ("aux_16", Role::Auxiliary, Quantity::Voltage, 1.0, 0),
 ];
 
-/// A filter that follows the range would let channels of different ranges lag by different times (docs/front-end.md), of which
-/// nothing here tells the host.
+/// A filter that depends on the range would give channels with different ranges different delays
+/// (docs/front-end.md), which are not reported to the host.
 const _: () = {
     let mut place = 1;
     while place < SETTINGS.ranges.len() {
@@ -50,7 +52,7 @@ const _: () = {
     }
 };
 
-/// The table, made once.
+/// The table, created once.
 ///
 /// # Panics
 /// When called twice.
@@ -72,12 +74,12 @@ pub fn table() -> &'static [Channel] {
     })
 }
 
-/// A name, cut to what one holds.
+/// A name, truncated to the maximum length.
 pub fn name(value: &str) -> Name {
     text(value)
 }
 
-/// A text, cut to what it holds.
+/// A text, truncated to its capacity.
 pub fn text<const N: usize>(value: &str) -> String<N> {
     value.chars().take(N).collect()
 }

@@ -1,4 +1,4 @@
-//! The two converters: their pins, and how they are set up before the rings take over.
+//! The two converters: their pins, and their set-up before the rings take over.
 
 use core::convert::Infallible;
 use core::mem::forget;
@@ -20,9 +20,9 @@ use embedded_hal::spi::{ErrorType as SpiErrorType, Operation, SpiBus, SpiDevice}
 use jointrig_firmware::ad7606b::part::{AD7606B, Lines, Oversampling};
 use jointrig_firmware::ad7606b::{CHANNELS, Converter, Error, Range, Settings};
 
-/// How both work. Eight conversions are averaged: 10 µs, which with the read-out of 3.6 µs leaves 5 µs of
-/// the 19.5 µs between two scans. All ranges are
-/// alike, so that all channels have one phase: docs/WIRING.md.
+/// Settings of both converters. Eight conversions are averaged: this takes 10 µs, which together
+/// with the read-out of 3.6 µs leaves 5 µs of the 19.5 µs between two scans. All ranges are the
+/// same, so that all channels have the same phase: docs/WIRING.md.
 pub const SETTINGS: Settings = Settings {
     ranges: [Range::Volts10; CHANNELS],
     oversampling: Oversampling::X8,
@@ -30,11 +30,11 @@ pub const SETTINGS: Settings = Settings {
     crc: true,
     wide_band: false,
 };
-/// Clock for registers: slow, because nothing waits for it.
+/// Clock for register accesses: slow, because they are not time-critical.
 const REGISTER_HZ: Hertz = Hertz(2_500_000);
-/// The serial port's own select pin: alternate function 5 of PE12 (SPI1_NSS) and PD0 (SPI2_NSS).
+/// Alternate function of the serial port's select pin: 5 on PE12 (SPI1_NSS) and PD0 (SPI2_NSS).
 const SELECT_FUNCTION: u8 = 5;
-/// Conversions of small codes before an input counts as open: 5 ms.
+/// Consecutive conversions with small codes before an input counts as open: 5 ms.
 const OPEN_AFTER: u8 = 255;
 
 /// Why a converter could not be set up.
@@ -66,7 +66,7 @@ where
     pub reset: Peri<'static, Reset>,
     /// BUSY.
     pub busy: Peri<'static, Busy>,
-    /// Carries the data to its ring.
+    /// DMA channel that transfers the data to the ring.
     pub dma: Peri<'static, Dma>,
 }
 
@@ -83,7 +83,8 @@ pub struct Chips {
     pub second: Second,
 }
 
-/// Waits whole µs. embassy's own divides ns by 64 bits, which costs a kilobyte.
+/// Delays of whole µs. embassy's implementation uses a 64-bit division of ns, which takes a
+/// kilobyte.
 struct Pause;
 
 impl DelayNs for Pause {
@@ -126,7 +127,7 @@ impl SpiDevice for Framed<'_> {
     }
 }
 
-/// A pin that is asked again and again: only for the few conversions of the self-test.
+/// A pin that is polled: only for the few conversions of the self-test.
 struct Asked<'a>(Input<'a>);
 
 impl PinErrorType for Asked<'_> {
@@ -167,7 +168,7 @@ impl embedded_hal_async::digital::Wait for Asked<'_> {
     }
 }
 
-/// As [`Chip::set_up`], for either chip: so that its code is there once.
+/// As [`Chip::set_up`], but not generic, so that the code exists only once for both chips.
 async fn set_up(
     port: Framed<'_>,
     reset: Output<'_>,
@@ -181,7 +182,7 @@ async fn set_up(
     converter.self_test(convst, &mut busy, &mut Pause).await?;
     converter.watch_inputs(0xFF, OPEN_AFTER)?;
     let (_, reset) = converter.into_adc_mode()?;
-    // RESET must stay low, driven, while the converter works
+    // RESET must remain driven low while the converter operates
     forget(reset);
     Ok(())
 }
@@ -197,10 +198,10 @@ where
     Busy: Pin,
     Dma: RxDma<Port>,
 {
-    /// Resets, sets up and tests the converter, and leaves it in ADC mode.
+    /// Resets, configures and tests the converter, and leaves it in ADC mode.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The fault found.
     pub async fn set_up(&mut self, convst: &mut Output<'_>) -> Result<(), Fault> {
         let mut config = Config::default();
         config.mode = MODE_2;
@@ -218,13 +219,14 @@ where
         set_up(Framed { bus, select }, reset, busy, convst).await
     }
 
-    /// Gives the pins the functions they have while the rings are filled: the port selects and clocks by itself, and
-    /// SDI is low, because anything else would be a command.
+    /// Sets the pin functions used while the rings are filled: the port drives select and clock by
+    /// itself, and SDI is low, because anything else would be a command.
     pub fn ready_for_ring(&mut self) {
         let mut config = Config::default();
         config.mode = MODE_2;
         config.gpio_speed = Speed::VeryHigh;
-        // these stay as they are until the next set-up, which makes its own: nothing is undone by dropping
+        // these stay as they are until the next set-up, which reconfigures them: dropping must not
+        // undo them
         forget(Spi::new_blocking_rxonly(
             self.port.reborrow(),
             self.clock.reborrow(),
@@ -238,7 +240,7 @@ where
         forget(Input::new(self.busy.reborrow(), Pull::Down));
     }
 
-    /// By which the port asks its DMA channel.
+    /// The port's DMA request number.
     pub fn request(&self) -> u8 {
         self.dma.request()
     }

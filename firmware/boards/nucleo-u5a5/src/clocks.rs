@@ -1,4 +1,4 @@
-//! Clocks: everything from the 16 MHz crystal, so that scans are timed by it.
+//! Clocks: all derived from the 16 MHz crystal, so that it determines the scan timing.
 
 use embassy_stm32::Config;
 use embassy_stm32::pac;
@@ -7,8 +7,8 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 
-/// 160 MHz for core, buses and timers: 16 / 2 × 60 / 3. The USB's PHY takes the crystal as it is, because its own
-/// PLL wants 16 MHz and nothing derived from PLL1 has been seen to work.
+/// 160 MHz for core, buses and timers: 16 / 2 × 60 / 3. The USB PHY uses the crystal directly,
+/// because its own PLL needs 16 MHz and no clock derived from PLL1 has been found to work.
 pub fn config() -> Config {
     let mut config = Config::default();
     config.rcc.hse = Some(Hse { freq: Hertz(16_000_000), mode: HseMode::Oscillator });
@@ -27,13 +27,16 @@ pub fn config() -> Config {
     config
 }
 
-/// Turns on the instruction cache and the flash's prefetch: both are off after a reset (RM0456, "ICACHE control register" and "FLASH access control
-/// register"), and at 160 MHz the flash makes the core wait four cycles for each line.
+/// Enables the instruction cache and the flash prefetch: both are disabled after a reset (RM0456,
+/// "ICACHE control register" and "FLASH access control register"), and at 160 MHz the core waits
+/// four cycles for each flash line.
 ///
-/// The chip's number must have been read before: it lies in the flash's read-only area, which the cache must not fetch (RM0456, "ICACHE": accesses to
-/// OTP and read-only area through the cache end in a bus error).
+/// The chip's unique id must be read before this: it is in the flash's read-only area, which must
+/// not be accessed through the cache (RM0456, "ICACHE": accesses to the OTP and read-only area
+/// through the cache end in a bus error).
 pub fn cache() {
-    // invalidated by hardware after a reset; turning it on while that lasts only delays it (RM0456, "ICACHE initialization")
+    // hardware invalidates the cache after a reset; enabling it during the invalidation only delays
+    // it (RM0456, "ICACHE initialization")
     pac::ICACHE.cr().modify(|w| w.set_en(true));
     pac::FLASH.acr().modify(|w| w.set_prften(true));
 }

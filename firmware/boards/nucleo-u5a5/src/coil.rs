@@ -1,17 +1,17 @@
-//! The hammer's coil: TIM1 in one-pulse mode, started by the scans' own timer.
+//! The hammer's coil: TIM1 in one-pulse mode, started by the scan timer.
 //!
-//! A pulse is one period of the counter, which stops by itself at its end. The counter has 16 bits and runs at
-//! 8 MHz, so that no period it can be told is longer than 8.2 ms: that is the cap, whatever software does. The break
-//! input (guard and emergency stop in series, low when either is open or the wire is broken) takes the output
-//! away at once and without software, and it stays away until the next order. The settings of the break
-//! and of the pin's idle level are locked until the next reset. Behind all of it the coil driver has a one-shot of its own
-//! (docs/WIRING.md).
+//! A pulse is one period of the counter, which stops by itself at its end. The counter has 16 bits
+//! and runs at 8 MHz, so that no period can be longer than 8.2 ms: this is the cap, whatever the
+//! software does. The break input (guard and emergency stop in series, low when either is open or
+//! the wire is broken) disables the output immediately and without software, and it stays disabled
+//! until the next order. The settings of the break and of the pin's idle level are locked until the
+//! next reset. In addition, the coil driver has its own one-shot (docs/WIRING.md).
 //!
-//! TIM2's update, which begins a scan's period, starts the counter (slave mode "trigger"); the output rises when
-//! it has counted 1 µs, with CONVST's edge. The trigger comes with every scan, so it must be heard once only: an order
-//! holds interrupts off until the next update (19.5 µs at most), sees the counter run, and stops listening. Should
-//! the core die between the two, pulses would follow each other: the driver's second one-shot allows none within
-//! half a second.
+//! TIM2's update, which begins a scan's period, starts the counter (slave mode "trigger"); the
+//! output rises after 1 µs, on CONVST's edge. The trigger occurs with every scan, so it must take
+//! effect only once: an order disables interrupts until the next update (at most 19.5 µs), confirms
+//! that the counter runs, and disables the trigger. If the core failed in between, pulses would
+//! repeat; the driver's second one-shot then allows none within half a second.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -40,14 +40,15 @@ const _: () = assert!(
     BEFORE_EDGE - 1 + COIL_PULSE_CAP_US * COUNTS_PER_US <= u16::MAX as u32,
     "the counter's width is the cap"
 );
-/// TIM1_BKIN on PE15.
+/// Alternate function of TIM1_BKIN on PE15.
 const BREAK_FUNCTION: u8 = 1;
 
-/// Whoever saw danger has taken the output away; only [`Coil::off`] lets a pulse begin again. An order that was on its
-/// way at that moment comes to nothing.
+/// Set by code that detected danger and disabled the output; only [`Coil::off`] allows pulses
+/// again. An order that was being processed at that moment has no effect.
 static VETOED: AtomicBool = AtomicBool::new(false);
 
-/// Takes the output away from whatever runs. For a task above acquisition, which may be stuck.
+/// Disables the output, whatever else is running. For a task with a higher priority than
+/// acquisition, which may be stuck.
 pub fn veto() {
     critical_section::with(|_| {
         VETOED.store(true, Ordering::Relaxed);
@@ -55,7 +56,7 @@ pub fn veto() {
     });
 }
 
-/// The timer that makes the pulse.
+/// The timer that generates the pulse.
 pub struct PulseTimer {
     timer: Timer<'static, TIM1>,
     _output: PwmPin<'static, TIM1, Ch1>,
@@ -63,7 +64,7 @@ pub struct PulseTimer {
 }
 
 impl PulseTimer {
-    /// Output off, break on.
+    /// Initialises with the output off and the break enabled.
     pub fn new(
         timer: Peri<'static, TIM1>,
         output: Peri<'static, PE9>,
@@ -71,7 +72,7 @@ impl PulseTimer {
     ) -> Self {
         let output = PwmPin::new(output, OutputType::PushPull);
         let mut break_input = Flex::new(break_input);
-        // pulled down: an open wire is a break
+        // pulled down: an open wire triggers the break
         break_input.set_as_af_unchecked(BREAK_FUNCTION, AfType::input(Pull::Down));
 
         let mut timer = Timer::new(timer);
@@ -84,20 +85,22 @@ impl PulseTimer {
         });
         // RM0456, "TIM1 internal trigger connection": ITR1 is TIM2's TRGO
         timer.set_trigger_source(TriggerSource::ITR1);
-        // low from 0 to CONVST's edge, high to the end of the period, low again when the counter has stopped at 0
+        // low from 0 to CONVST's edge, high to the end of the period, low again when the counter
+        // has stopped at 0
         timer.set_output_compare_mode(Channel::Ch1, OutputCompareMode::PwmMode2);
         timer.set_output_compare_preload(Channel::Ch1, false);
         timer.set_output_polarity(Channel::Ch1, OutputPolarity::ActiveHigh);
         timer.set_compare_value(Channel::Ch1, BEFORE_EDGE as u16);
         timer.set_max_compare_value(1);
-        // a core that has locked up breaks the pulse too, until the next reset (RM0456, "SYSCFG configuration register 2", CLL)
+        // a core lock-up also triggers the break, until the next reset (RM0456, "SYSCFG
+        // configuration register 2", CLL)
         pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
         timer.set_break_polarity(Bkp::ACTIVE_LOW);
         timer.set_break_filter(FilterValue::FDTS_DIV8_N6);
         timer.set_break_input_pin_enable(true);
         timer.set_break_enable(true);
         timer.set_automatic_output_enable(false);
-        // without permission the pin is driven low, not left floating
+        // while the output is disabled, the pin is driven low instead of floating
         timer.set_ossi(Ossi::IDLE_LEVEL);
         timer.enable_channel(Channel::Ch1, true);
         timer.regs_1ch_cmp().bdtr().modify(|w| w.set_lock(Lock::LEVEL2));
@@ -108,7 +111,8 @@ impl PulseTimer {
         self.timer.regs_core().cr1().read().cen()
     }
 
-    /// Lets the next update of TIM2 start the counter, and no other. False when none came within two periods.
+    /// Lets only the next update of TIM2 start the counter. Returns false when none occurred within
+    /// two periods.
     fn start_with_next_scan(&self) -> bool {
         let scans = || pac::TIM5.cnt().read();
         self.timer.set_slave_mode(SlaveMode::TRIGGER_MODE);
@@ -126,7 +130,8 @@ impl Coil for PulseTimer {
 
     fn pulse(&mut self, width_us: u32) {
         if self.runs() {
-            // the pulse before this one has not ended: it will, and this one is not for adding to it
+            // the previous pulse has not ended; it will end as set, and this order must not extend
+            // it
             return;
         }
         let counts = width_us.clamp(1, COIL_PULSE_CAP_US) * COUNTS_PER_US;
@@ -136,7 +141,7 @@ impl Coil for PulseTimer {
             if VETOED.load(Ordering::Relaxed) {
                 return;
             }
-            // a break that is over is forgotten, one that lasts keeps the output away
+            // a past break is cleared; an active one keeps the output disabled
             self.timer.regs_1ch_cmp().sr().modify(|w| w.set_bif(0, false));
             self.timer.set_moe(true);
             if self.timer.get_moe() && !self.start_with_next_scan() {

@@ -1,14 +1,14 @@
-//! What the rings and the drive share of GPDMA1: a channel put to rest, and links of a list.
+//! Functions for GPDMA1 shared by the rings and the drive: stopping a channel, and links of a list.
 
 use embassy_stm32::pac::GPDMA1;
 use embassy_stm32::pac::gpdma::regs::ChLlr;
 
-/// Stops a channel, whatever it does, and clears its flags.
+/// Stops a channel in any state and clears its flags.
 pub fn stop(channel: usize) {
     let channel = GPDMA1.ch(channel);
     if channel.cr().read().en() {
         channel.cr().modify(|w| w.set_susp(true));
-        // within a few cycles (RM0456, "GPDMA channel suspend"): the transfer under way is one word
+        // takes a few cycles (RM0456, "GPDMA channel suspend"): the current transfer is one word
         while !channel.sr().read().suspf() && channel.cr().read().en() {}
     }
     channel.cr().write(|w| w.set_reset(true));
@@ -23,23 +23,23 @@ pub fn stop(channel: usize) {
     });
 }
 
-/// Whether a channel works: on, and no error has stopped it.
+/// Whether a channel is running: enabled, and not stopped by an error.
 pub fn works(channel: usize) -> bool {
     let channel = GPDMA1.ch(channel);
     let status = channel.sr().read();
     channel.cr().read().en() && !(status.dtef() || status.ulef() || status.usef())
 }
 
-/// Which address an item of a list carries besides its byte count.
+/// The address that a list item contains in addition to its byte count.
 #[derive(Clone, Copy)]
 pub enum Carries {
-    /// Where to read.
+    /// The source address.
     Source,
-    /// Where to write.
+    /// The destination address.
     Destination,
 }
 
-/// A link to the item at `address`: byte count, the address it carries, and a link of its own.
+/// A link to the item at `address`, which contains a byte count, an address and a link.
 pub fn link(address: u32, carries: Carries) -> ChLlr {
     let mut link = ChLlr(0);
     link.set_ub1(true);

@@ -1,16 +1,17 @@
-//! The shaker's drive: DAC1's first output on PA4, one code per scan, in step with CONVST.
+//! The shaker's drive: DAC1's first output on PA4, one code per scan, synchronised with CONVST.
 //!
-//! TIM2's update ends a scan's period: it makes the DAC put out the word it holds, and CONVST rises 1 µs later. The
-//! DAC then asks GPDMA channel 2, the player, for the next word of a ring. The same update asks channel 3,
-//! the eraser, which writes rest behind the player ([`jointrig_firmware::feed`]). Neither needs a program: when it
-//! hangs, the ring is at rest after what was given (1.5 ms as a rule, 4.4 ms at most), and stays so.
+//! TIM2's update ends a scan's period: it makes the DAC output the word it holds, and CONVST rises
+//! 1 µs later. The DAC then requests the next word of a ring from GPDMA channel 2, the player. The
+//! same update triggers channel 3, the eraser, which writes rest behind the player
+//! ([`jointrig_firmware::feed`]). Neither needs software: if the program hangs, the ring returns to
+//! rest after the last code (usually 1.5 ms, at most 4.4 ms) and stays there.
 //!
-//! TIM5, which counts TIM2's updates, is the player's position. The word that the player takes after the n-th update
-//! is put out with the (n+1)-th.
+//! TIM5, which counts TIM2's updates, gives the player's position. The word that the player takes
+//! after the n-th update is output with the (n+1)-th.
 //!
-//! Rest is the middle of the DAC's range. The amplifier sees 0 V then, and also while the pin floats in reset: a
-//! capacitor and a divider to the middle see to that (docs/WIRING.md). PE10 holds the relay that lets the amplifier
-//! hear at all; it is low in reset.
+//! Rest is the middle of the DAC's range. The amplifier then receives 0 V, and also while the pin
+//! floats in reset: a capacitor and a divider to mid-supply ensure this (docs/WIRING.md). PE10
+//! controls the relay that connects the amplifier; it is low in reset.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering, fence};
@@ -30,17 +31,17 @@ use jointrig_firmware::feed::{FULL_SCALE_STEPS, Feed, REST, RING, TRAIL, Words};
 
 use crate::dma::{self, Carries};
 
-/// VREF+ of the board, V: its 3.3 V supply.
+/// VREF+ of the board, V: the 3.3 V supply.
 const REFERENCE_V: f32 = 3.3;
 /// Steps of the DAC.
 const STEPS: f32 = 4096.0;
-/// From the DAC's pin to the amplifier (docs/WIRING.md).
+/// Gain from the DAC's pin to the amplifier (docs/WIRING.md).
 const STAGE_GAIN: f32 = 2.0;
-/// At the amplifier's input with the largest code, V.
+/// Voltage at the amplifier's input for the largest code, V.
 pub const FULL_SCALE_V: f32 = FULL_SCALE_STEPS / STEPS * REFERENCE_V * STAGE_GAIN;
-/// PE10 of GPIOE.
+/// PE10: bit number in GPIOE.
 const ENABLE_BIT: usize = 10;
-/// DAC1's first channel in its registers.
+/// Index of DAC1's first channel in its registers.
 const CHANNEL: usize = 0;
 /// GPDMA channels.
 const PLAYER: usize = 2;
@@ -48,10 +49,11 @@ const ERASER: usize = 3;
 const WORD_BYTES: u32 = size_of::<u32>() as u32;
 const RING_BYTES: u32 = RING * WORD_BYTES;
 
-/// What a DMA channel loads to go round again: byte count, address, and the link to this again.
+/// List item that a DMA channel loads to repeat: byte count, address, and the link to this item.
 type Item = [u32; 3];
 
-/// What the DMA reads and writes. Aligned to more than an item's size, so that none crosses a 64 kB page.
+/// Memory read and written by the DMA. Aligned to more than an item's size, so that no item crosses
+/// a 64 kB page.
 #[repr(C, align(64))]
 struct Shared {
     player: UnsafeCell<Item>,
@@ -60,7 +62,8 @@ struct Shared {
     rest: u32,
 }
 
-/// The ring's words. Zeros until the drive starts, which writes rest everywhere first: so they take no flash.
+/// The ring's words. Zero until the drive starts, which first writes rest everywhere; so they take
+/// no flash.
 #[repr(C, align(64))]
 struct Ringed(UnsafeCell<[u32; RING as usize]>);
 
@@ -69,18 +72,18 @@ unsafe impl Sync for Ringed {}
 
 static WORDS: Ringed = Ringed(UnsafeCell::new([0; RING as usize]));
 
-// SAFETY: the items are written only while both channels are off, and read only by the DMA. The words are touched
-// by the DMA and, through volatile accesses inside critical sections, by `In`; each is a `u32` of which any value
-// may be played, and the accesses of both sides are whole words.
+// SAFETY: the items are written only while both channels are off, and read only by the DMA. The
+// words are accessed by the DMA and, with volatile accesses inside critical sections, by `In`; each
+// is a `u32` of which any value may be played, and both sides access whole words.
 unsafe impl Sync for Shared {}
 
 static SHARED: Shared =
     Shared { player: UnsafeCell::new([0; 3]), _apart: 0, eraser: UnsafeCell::new([0; 3]), rest: REST };
 
-/// Whoever stopped everything has muted the drive; only [`Drive::rest`] lets it play again.
+/// Set when an emergency stop has muted the drive; only [`Drive::rest`] allows playing again.
 static MUTED: AtomicBool = AtomicBool::new(false);
 
-/// The ring's words, inside a critical section.
+/// Access to the ring's words within a critical section.
 struct In<'a>(#[allow(dead_code, reason = "proves the section")] critical_section::CriticalSection<'a>);
 
 impl Words for In<'_> {
@@ -95,8 +98,8 @@ impl Words for In<'_> {
     }
 }
 
-/// Takes the drive away from whatever runs: silence in the ring within 0.1 ms, and the relay falls. For a task
-/// above acquisition, which may be stuck.
+/// Disables the drive, whatever else is running: the ring is at rest within 0.1 ms, and the relay
+/// drops. For a task with a higher priority than acquisition, which may be stuck.
 pub fn mute() {
     critical_section::with(|section| {
         pac::GPIOE.bsrr().write(|w| w.set_br(ENABLE_BIT, true));
@@ -117,7 +120,7 @@ pub struct ShakerDrive {
 }
 
 impl ShakerDrive {
-    /// At rest. TIM2 and TIM5 must run already.
+    /// Initialises at rest. TIM2 and TIM5 must already run.
     pub fn new(
         dac: Peri<'static, DAC1>,
         output: Peri<'static, PA4>,
@@ -127,14 +130,14 @@ impl ShakerDrive {
     ) -> Self {
         let enable = Output::new(enable, Level::Low, Speed::Low);
         let mut dac = DacChannel::new_blocking(dac, output);
-        // without a trigger yet, so that it is put out now
+        // no trigger is set yet, so that the value is output immediately
         dac.set(Value::Bit12Right(REST as u16));
         let mut drive = Self { feed: Feed::new(), started_at: 0, enable, _dac: dac, player, eraser };
         drive.start();
         drive
     }
 
-    /// Starts player and eraser from the ring's beginning, right after an update of TIM2.
+    /// Starts player and eraser at the ring's beginning, right after an update of TIM2.
     fn start(&mut self) {
         let player = Dma::<DAC1, Ch1>::request(&*self.player);
         let eraser = UpDma::<ScanTimer>::request(&*self.eraser);
@@ -149,7 +152,7 @@ impl ShakerDrive {
             pac::DAC1.sr().write(|w| w.set_dmaudr(CHANNEL, true));
             pac::DAC1.cr().modify(|w| w.set_tsel(CHANNEL, ChannelTrigger::<DAC1>::signal(&TIM2_TRGO)));
 
-            // a whole period is left after its beginning, of which this needs a µs
+            // a whole period follows an update, of which this needs 1 µs
             let before = TIM5.cnt().read();
             while TIM5.cnt().read() == before {}
             self.started_at = TIM5.cnt().read();
@@ -169,8 +172,9 @@ impl ShakerDrive {
         });
     }
 
-    /// Whether both channels go round, and the DAC has never waited in vain. A DAC that has asks no more
-    /// (RM0456, "DMA underrun") and keeps its last word: of that the capacitor behind it leaves nothing.
+    /// Whether both channels are running and the DAC has had no underrun. After an underrun the DAC
+    /// issues no more requests (RM0456, "DMA underrun") and holds its last word; the capacitor
+    /// after it blocks this constant voltage.
     fn works() -> bool {
         dma::works(PLAYER) && dma::works(ERASER) && !pac::DAC1.sr().read().dmaudr(CHANNEL)
     }
@@ -185,12 +189,12 @@ impl ShakerDrive {
     }
 }
 
-/// Ring to DAC, a word for each of the DAC's requests, round and round.
+/// Player: ring to DAC, one word per DAC request, cyclically.
 fn prepare_player(request: u8) {
     let ring = WORDS.0.get() as u32;
     let item = SHARED.player.get();
     let link = dma::link(item as u32, Carries::Source);
-    // SAFETY: both channels are off, so that the DMA does not read the item; nobody else does.
+    // SAFETY: both channels are off, so that the DMA does not read the item; nothing else does.
     unsafe { item.write_volatile([RING_BYTES, ring, link.0]) };
     fence(Ordering::SeqCst);
     let channel = GPDMA1.ch(PLAYER);
@@ -212,8 +216,8 @@ fn prepare_player(request: u8) {
     channel.llr().write_value(ChLlr(link.0));
 }
 
-/// Rest to ring, a word for each of TIM2's updates, [`TRAIL`] words behind the player: the first time only to
-/// the ring's end.
+/// Eraser: rest value to ring, one word per update of TIM2, [`TRAIL`] words behind the player; its
+/// first pass covers only the end of the ring.
 fn prepare_eraser(request: u8) {
     let ring = WORDS.0.get() as u32;
     let item = SHARED.eraser.get();

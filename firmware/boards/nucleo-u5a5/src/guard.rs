@@ -1,12 +1,13 @@
-//! Guard and emergency stop, told when they change instead of once a block.
+//! Guard and emergency stop, handled when they change instead of once per block.
 //!
-//! EXTI lines 13 and 14 wake a task on an executor of its own, above acquisition: it runs within some
-//! microseconds, also when no blocks come and when acquisition never returns. It takes coil and drive away by itself and
-//! tells the core, which disarms and lets the host hear of it. A core that is locked for ever, or interrupts
-//! that stay off, stop this task too: then TIM1's break has already ended the pulse in hardware, and the watchdog resets.
+//! EXTI lines 13 and 14 wake a task on a separate executor with a higher priority than acquisition:
+//! it runs within some microseconds, also when no blocks arrive and when acquisition never returns.
+//! It disables coil and drive directly and informs the core, which disarms the hammer and reports
+//! to the host. A core that is locked up forever, or interrupts that stay disabled, also stop this
+//! task: TIM1's break has then already ended the pulse in hardware, and the watchdog resets.
 //!
-//! These lines' pending bits are cleared here and no other's: embassy's own EXTI handler would clear those of
-//! BUSY as well.
+//! Only the pending bits of these lines are cleared here: embassy's own EXTI handler would also
+//! clear those of BUSY.
 
 use core::future::poll_fn;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -18,9 +19,9 @@ use embassy_sync::waitqueue::AtomicWaker;
 
 use crate::{Shared, coil, drive, inputs};
 
-/// EXTI lines, which are pin numbers, of PF13 and PF14.
+/// EXTI lines of PF13 and PF14, equal to the pin numbers.
 const LINES: [usize; 2] = [13, 14];
-/// Port F in EXTICR.
+/// Code of port F in EXTICR.
 const PORT_F: u8 = 5;
 
 static CHANGED: AtomicBool = AtomicBool::new(false);
@@ -43,7 +44,7 @@ fn EXTI14() {
     on_edge(14);
 }
 
-/// Lets the edges through. The pins are inputs already.
+/// Enables the edge interrupts. The pins are already inputs.
 fn listen() {
     critical_section::with(|_| {
         for line in LINES {
@@ -54,7 +55,8 @@ fn listen() {
         }
     });
     for number in [interrupt::EXTI13, interrupt::EXTI14] {
-        // SAFETY: their handlers stand above and touch nothing but their own lines, an atomic and a waker.
+        // SAFETY: their handlers are defined above and access only their own lines, an atomic and a
+        // waker.
         unsafe { number.enable() };
     }
 }
@@ -67,13 +69,13 @@ async fn edge() {
     .await;
 }
 
-/// Runs for ever.
+/// Runs forever.
 #[embassy_executor::task]
 pub async fn task(core: &'static Shared) {
     listen();
     loop {
         let (closed, pressed) = (inputs::may_move(), inputs::stop_is_pressed());
-        // first the hardware, then the words
+        // first the hardware, then the report
         if !closed || pressed {
             coil::veto();
         }

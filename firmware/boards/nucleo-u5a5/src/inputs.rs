@@ -1,8 +1,9 @@
-//! Guard, emergency stop, the key that resets it, and what K1's own contact says of K1.
+//! Guard, emergency stop, the reset key of the latter, and the monitoring contact of relay K1.
 //!
-//! The firmware looks at them once a block (every 0.3 ms) and when guard or stop change ([`crate::guard`]); the coil
-//! does not wait for either: guard and stop also act on TIM1's break and on the coil driver's gate. Each input is high when all is well, and pulled down, so
-//! that a broken wire is an open guard and a pressed stop.
+//! The firmware reads them once per block (every 0.3 ms) and when guard or stop change
+//! ([`crate::guard`]). The coil does not wait for either: guard and stop also act on TIM1's break
+//! and on the coil driver's gate. Each input is high when all is well and pulled down, so that a
+//! broken wire reads as an open guard and a pressed stop.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_stm32::Peri;
@@ -16,7 +17,7 @@ use jointrig_firmware::board::Inputs;
 use jointrig_firmware::relay::{Fault, Relay};
 use jointrig_protocol::slow::Slow;
 
-/// Whether K1 was seen to do what it is told; whoever takes the pins' word for the guard asks this too.
+/// Whether K1 was seen to follow its coil; must be checked together with the guard's pin.
 static RELAY_IS_SOUND: AtomicBool = AtomicBool::new(false);
 
 /// Whether the guard is closed and K1 can be relied on to open.
@@ -24,7 +25,7 @@ pub fn may_move() -> bool {
     guard_is_closed() && RELAY_IS_SOUND.load(Ordering::Relaxed)
 }
 
-/// Whether the guard is closed, for whoever may not own the pin.
+/// Whether the guard is closed, for code that does not own the pin.
 pub fn guard_is_closed() -> bool {
     GPIOF.idr().read().idr(13) == Idr::HIGH
 }
@@ -47,7 +48,7 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// Guard, stop, key, K1's contact that is closed at rest.
+    /// Parameters: guard, stop, key, and K1's normally closed contact.
     pub fn new(
         guard: Peri<'static, PF13>,
         stop: Peri<'static, PF14>,
@@ -58,7 +59,7 @@ impl Switches {
             _guard: Input::new(guard, Pull::Down),
             _stop_released: Input::new(stop, Pull::Down),
             key: Input::new(key, Pull::Down),
-            // a key that is stuck, or was left turned, resets nothing
+            // initially true: a key that is stuck or was left turned must not reset anything
             key_was_on: true,
             dropped: Input::new(dropped, Pull::Down),
             relay: Relay::new(),
@@ -70,7 +71,7 @@ impl Switches {
 
 impl Inputs for Switches {
     fn interlock_closed(&mut self) -> bool {
-        // stop and guard are in series before K1's coil
+        // stop and guard are in series with K1's coil
         let chain_closed = guard_is_closed() && !stop_is_pressed();
         let seen = self.relay.see(chain_closed, self.dropped.is_high(), Instant::now().as_micros());
         RELAY_IS_SOUND.store(seen.is_ok(), Ordering::Relaxed);

@@ -1,7 +1,8 @@
-//! What outlives a reset: the last panic's words, and which start of the controller this is.
+//! Data that survive a reset: the last panic's message, and the count of starts of the controller.
 //!
-//! Both lie in RAM that start-up code does not touch. After a power cut they are noise, which a check value
-//! tells from a record; after a watchdog's or our own reset they are what was written.
+//! Both are in RAM that the start-up code does not initialise. After a power cut they are random,
+//! which a checksum distinguishes from a valid record; after a reset by the watchdog or by software
+//! they are unchanged.
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
@@ -15,15 +16,17 @@ use jointrig_firmware::sentence::{Sentence, Tell};
 use jointrig_protocol::answer::Reset;
 use jointrig_protocol::limits::SENTENCE_BYTES;
 
-/// Characters of a file's path that a panic keeps: package, version and file of all that are built in.
+/// Characters of a file's path kept for a panic: package, version and file for all packages in the
+/// image.
 const MOST_OF_A_PATH: usize = 60;
-/// Marks a record as one of ours ("JRIG").
+/// Marks a valid record ("JRIG").
 const MAGIC: u32 = 0x4A52_4947;
 
-/// The last words: [`MAGIC`], their length, their bytes and a check sum, all in words. A volatile access to each byte would be an instruction
-/// of its own: as bytes this took 2 kB of flash.
+/// The panic record: [`MAGIC`], the length, the bytes of the message and a checksum, all in words.
+/// A volatile access to each byte would be a separate instruction: with bytes this took 2 kB of
+/// flash.
 type Record = [u32; RECORD_WORDS];
-/// Words of a sentence.
+/// Words of the message.
 const TEXT_WORDS: usize = SENTENCE_BYTES / 4;
 const RECORD_WORDS: usize = TEXT_WORDS + 3;
 const _: () = assert!(SENTENCE_BYTES.is_multiple_of(4));
@@ -32,7 +35,7 @@ const _: () = assert!(SENTENCE_BYTES.is_multiple_of(4));
 #[repr(C)]
 struct Starts {
     count: u32,
-    /// Drawn when power came.
+    /// Random number drawn at power-on.
     first: u32,
     sum: u32,
 }
@@ -43,39 +46,40 @@ impl Starts {
     }
 }
 
-/// Which start this is.
+/// Identification of this start.
 #[derive(Clone, Copy)]
 pub struct Start {
-    /// 1 after power came, one more after every other reset.
+    /// 1 after power-on, one more after every other reset.
     pub count: u32,
-    /// One more with every reset, another one after power came.
+    /// One more after every reset, a different number after power-on.
     pub boot: u32,
 }
 
-// SAFETY of the section: both are plain numbers, of which any bytes are a value; nothing reads them as
-// initialised before they were checked.
+// SAFETY of the section: both are plain numbers, for which any bytes are valid; nothing uses them
+// as initialised before they were checked.
 #[unsafe(link_section = ".uninit.jointrig_panic")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 #[unsafe(link_section = ".uninit.jointrig_starts")]
 static mut STARTS: MaybeUninit<Starts> = MaybeUninit::uninit();
 
-/// FNV-1a by words: noise that passes both this and the magic is a matter of 2^-64.
+/// FNV-1a by words: the probability that random data pass both this and the magic is 2^-64.
 fn sum_of(record: &Record) -> u32 {
     record[1..RECORD_WORDS - 1]
         .iter()
         .fold(0x811C_9DC5, |sum, word| (sum ^ word).rotate_left(5).wrapping_mul(0x0100_0193))
 }
 
-/// Says what the last run's panic said, once.
+/// Returns the message of the last run's panic, once.
 pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
     let mut record = [0; RECORD_WORDS];
     let kept = addr_of_mut!(RECORD).cast::<u32>();
     for (place, word) in record.iter_mut().enumerate() {
-        // SAFETY: called first of all in `main`, before any task or interrupt that could panic runs; the volatile
-        // read takes whatever is there, inside the record, and any bytes are a word.
+        // SAFETY: called first in `main`, before any task or interrupt that could panic runs; the
+        // volatile read accepts any content, stays inside the record, and any bytes are a valid
+        // word.
         *word = unsafe { kept.add(place).read_volatile() };
     }
-    // SAFETY: as above; a record is told once.
+    // SAFETY: as above; this invalidates the record, so that it is returned only once.
     unsafe { kept.write_volatile(0) };
     if record[0] != MAGIC || record[RECORD_WORDS - 1] != sum_of(&record) {
         return None;
@@ -84,8 +88,9 @@ pub fn take_panic() -> Option<String<SENTENCE_BYTES>> {
     String::from_utf8(words.take(record[1] as usize).collect()).ok()
 }
 
-/// Why this start is, once: the flags are cleared, so that the next start tells its own (RM0456, "RCC control/status register",
-/// `RCC_CSR`). A watchdog and a reset by software pull the pin too, so the pin alone counts only without them.
+/// The cause of this start, once: the flags are cleared, so that the next start reports its own
+/// cause (RM0456, "RCC control/status register", `RCC_CSR`). Watchdog and software resets also
+/// assert the reset pin, so the pin flag counts only without theirs.
 pub fn take_reset() -> Reset {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
@@ -94,7 +99,7 @@ pub fn take_reset() -> Reset {
     } else if flags.sftrstf() {
         Reset::Software
     } else if flags.borrstf() {
-        // set by power coming and by a supply that sags: the count of starts outlives the second only
+        // set at power-on and by a supply dip: the count of starts survives only the latter
         if has_counted() { Reset::Brownout } else { Reset::Power }
     } else if flags.pinrstf() {
         Reset::Pin
@@ -103,16 +108,17 @@ pub fn take_reset() -> Reset {
     }
 }
 
-/// Whether what is kept of earlier starts is whole.
+/// Whether the record of earlier starts is valid.
 fn has_counted() -> bool {
     // SAFETY: as in `count_start`, which is called later.
     let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
     before.sum == before.due_sum()
 }
 
-/// Counts this start; `draw` gives the first number after power came.
+/// Counts this start; `draw` provides the first number after power-on.
 pub fn count_start(draw: impl FnOnce() -> u32) -> Start {
-    // SAFETY: called once in `main` before any task runs, and no interrupt uses it; any bytes are a `Starts`.
+    // SAFETY: called once in `main` before any task runs, and no interrupt uses it; any bytes are a
+    // valid `Starts`.
     let before = unsafe { addr_of!(STARTS).cast::<Starts>().read_volatile() };
     let (count, first) = if before.sum == before.due_sum() {
         (before.count.wrapping_add(1), before.first)
@@ -126,7 +132,7 @@ pub fn count_start(draw: impl FnOnce() -> u32) -> Start {
     Start { count, boot: first.wrapping_add(count).wrapping_sub(1) }
 }
 
-/// Coil off, words kept, reset.
+/// Switches the coil off, stores the message, and resets.
 fn end(what: &Sentence) -> ! {
     cortex_m::interrupt::disable();
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
@@ -138,20 +144,21 @@ fn end(what: &Sentence) -> ! {
     }
     record[RECORD_WORDS - 1] = sum_of(&record);
     for (place, word) in record.iter().enumerate() {
-        // SAFETY: interrupts are off and nothing returns from here, so that nobody else uses the record; inside it.
+        // SAFETY: interrupts are disabled and this function does not return, so that nothing else
+        // uses the record; the access is inside it.
         unsafe { addr_of_mut!(RECORD).cast::<u32>().add(place).write_volatile(*word) };
     }
     cortex_m::asm::dsb();
     SCB::sys_reset()
 }
 
-/// File and line, and the message where it needs no formatting: the code that formats numbers would cost 5 kB of flash, and the line says
-/// which number was meant.
+/// Stores file and line, and the message if it needs no formatting: the code that formats numbers
+/// would take 5 kB of flash, and the line identifies the numbers.
 #[panic_handler]
 fn panicked(info: &PanicInfo<'_>) -> ! {
     let mut sentence = Sentence::default();
     if let Some(at) = info.location() {
-        // the end of a long path says more than its beginning
+        // the end of a long path is more informative than its beginning
         let file = at.file();
         let from = file.len().saturating_sub(MOST_OF_A_PATH);
         sentence.text(file.get(from..).unwrap_or(file)).text(":").number(at.line()).text(": ");

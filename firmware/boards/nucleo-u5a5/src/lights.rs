@@ -1,4 +1,5 @@
-//! Three lights on the board: green beats while the program runs, blue while scans come, red after a fault.
+//! Three lights on the board: green blinks while the program runs, blue is on while scans arrive,
+//! red after a fault.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,12 +8,12 @@ use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::peripherals::{PB7, PC7, PG2};
 use embassy_time::Timer;
 
-/// Scans come.
+/// Scans are arriving.
 pub static SCANNING: AtomicBool = AtomicBool::new(false);
-/// A part reported a fault, and no block has come whole since.
+/// A part has reported a fault, and no complete block has arrived since.
 pub static FAULT: AtomicBool = AtomicBool::new(false);
 
-/// Runs for ever.
+/// Runs forever.
 #[embassy_executor::task]
 pub async fn task(green: Peri<'static, PC7>, blue: Peri<'static, PB7>, red: Peri<'static, PG2>) {
     let mut green = Output::new(green, Level::Low, Speed::Low);

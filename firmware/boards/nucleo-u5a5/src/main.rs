@@ -1,25 +1,26 @@
-//! The rig's controller: a NUCLEO-U5A5ZJ-Q with two AD7606B, the hammer's coil and a high-speed USB.
+//! The rig's controller: a NUCLEO-U5A5ZJ-Q with two AD7606B, the hammer's coil and a high-speed USB
+//! port.
 //!
-//! This crate is wiring; what the instrument does is `jointrig-firmware`. Pins: docs/WIRING.md. What has not
-//! yet been seen on a real board: docs/first-light.md.
+//! This crate contains only the wiring; the instrument's logic is in `jointrig-firmware`. Pins:
+//! docs/WIRING.md. Functions not yet verified on a real board: docs/first-light.md.
 //!
 //! Timing does not depend on software:
 //!
-//! | what | who does it |
+//! | function | implementation |
 //! |---|---|
 //! | sampling instants | TIM2 drives CONVST of both converters |
-//! | counting them | TIM5 counts TIM2's periods, so that a scan that never came is known to be missing |
+//! | counting them | TIM5 counts TIM2's periods, so that missing scans are detected |
 //! | reading 16 channels | the end of BUSY starts SPI1 and SPI2, GPDMA writes rings ([`rings`]) |
-//! | making SPI1 and SPI2 ready for it | TIM2 asks GPDMA to switch them off and on ([`restart`]) |
-//! | the beginning of a coil pulse | TIM2 starts TIM1 ([`coil`]) |
+//! | preparing SPI1 and SPI2 for it | TIM2 makes GPDMA switch them off and on ([`restart`]) |
+//! | start of a coil pulse | TIM2 starts TIM1 ([`coil`]) |
 //! | its end | TIM1 in one-pulse mode; its longest period is the cap |
-//! | the shaker's codes | TIM2 asks for each; the DMA brings them, and rest behind them ([`drive`]) |
-//! | an external clock, edges at the sync input | TIM3 ([`sync`]) |
+//! | the shaker's codes | TIM2 requests each; DMA supplies them, followed by rest ([`drive`]) |
+//! | external clock, edges at the sync input | TIM3 ([`sync`]) |
 //! | guard and emergency stop | TIM1's break input, and the coil driver's own gate |
 //! | a program that hangs | the independent watchdog ([`watchdog`]) |
 //!
-//! Three executors: guard and emergency stop ([`guard`]) above acquisition, acquisition above USB, watch and lights in
-//! thread mode.
+//! There are three executors. In order of decreasing priority they run guard and emergency stop
+//! ([`guard`]), acquisition, and, in thread mode, USB, watch and lights.
 #![no_std]
 #![no_main]
 
@@ -61,10 +62,10 @@ pub const BLOCK_SCANS: usize = match scans_per_block(MAX_CHANNELS) {
     Some(scans) => scans,
     None => unreachable!(),
 };
-/// Blocks that the ring holds: a second and a tenth, 1.9 MB.
+/// Blocks that the ring holds: 1.1 seconds, 1.9 MB.
 const SLOTS: usize = (SCAN_RATE_HZ as usize * 11 / 10).div_ceil(BLOCK_SCANS);
 
-/// What the tasks share.
+/// State shared by the tasks.
 pub type Shared = Core<'static, CriticalSectionRawMutex>;
 
 /// This board.
@@ -83,15 +84,16 @@ impl Board for Nucleo {
 
 static RING: ConstStaticCell<[Slot; SLOTS]> = ConstStaticCell::new([Slot::EMPTY; SLOTS]);
 static CORE: StaticCell<Shared> = StaticCell::new();
-/// Acquisition's.
+/// Executor of acquisition.
 static ABOVE: InterruptExecutor = InterruptExecutor::new();
-/// The guard's.
+/// Executor of the guard.
 static TOP: InterruptExecutor = InterruptExecutor::new();
 
-/// A vector that nothing else uses serves as acquisition's software interrupt.
+/// An otherwise unused interrupt vector serves as acquisition's software interrupt.
 #[embassy_stm32::interrupt]
 fn LPUART1() {
-    // SAFETY: only this interrupt polls the executor, and it was started before the interrupt was enabled.
+    // SAFETY: only this interrupt polls the executor, which was started before the interrupt was
+    // enabled.
     unsafe { ABOVE.on_interrupt() }
 }
 
@@ -121,12 +123,12 @@ async fn watching(core: &'static Shared) {
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     jointrig_board_fault::limit_stack();
-    // before anything else: what the last run left behind
+    // first: what the last run left in memory
     let last_panic = keep::take_panic();
     let reset = keep::take_reset();
     probe::start();
     let p = embassy_stm32::init(clocks::config());
-    // the chip's number lies where the cache must not read (clocks::cache)
+    // the chip's unique id is where the cache must not read (clocks::cache)
     let serial = channels::name(embassy_stm32::uid::uid_hex());
     clocks::cache();
     let dog = watchdog::start(p.IWDG);
@@ -193,7 +195,7 @@ async fn main(spawner: Spawner) {
     let top = TOP.start(interrupt::UART5);
     interrupt::LPUART1.set_priority(Priority::P6);
     let above = ABOVE.start(interrupt::LPUART1);
-    // each task is spawned once, so that its one place is free
+    // each task is spawned once, so that its single slot is free
     top.spawn(defmt::unwrap!(guard::task(core)));
     above.spawn(defmt::unwrap!(acquisition(core, scans, coil, drive, inputs)));
     spawner.spawn(defmt::unwrap!(watching(core)));

@@ -1,8 +1,8 @@
-//! Log lines for a debug probe, over RTT: what `cargo xtask flash` shows.
+//! Log lines for a debug probe over RTT, shown by `cargo xtask flash`.
 //!
-//! Without a probe, and with one that is too slow, a line that finds no room is left out whole. A probe's program may ask
-//! the controller to wait instead, by a word in the channel's memory: that is undone before each line, because the wait
-//! would be one with interrupts off.
+//! Without a probe, or with one that is too slow, a line that does not fit is dropped as a whole. A
+//! probe's program may request a blocking mode by a word in the channel's memory; this is reverted
+//! before each line, because the controller would wait with interrupts disabled.
 
 use core::cell::RefCell;
 
@@ -12,7 +12,7 @@ use rtt_target::{UpChannel, rtt_init};
 
 static CHANNEL: Mutex<RefCell<Option<UpChannel>>> = Mutex::new(RefCell::new(None));
 
-/// From here on, log lines reach the probe. The channel's name is how probe-rs knows what it carries.
+/// Sends log lines to the probe from now on. probe-rs recognises the content by the channel's name.
 pub fn start() {
     let channels = rtt_init! { up: { 0: { size: 1024, mode: NoBlockSkip, name: "defmt" } } };
     critical_section::with(|free| CHANNEL.borrow_ref_mut(free).replace(channels.up.0));

@@ -1,9 +1,11 @@
-//! The ports off and on again before each conversion, without the CPU.
+//! Disables and re-enables the ports before each conversion, without the CPU.
 //!
-//! A port that has sent its count of words starts no further transfer, whatever triggers it, until it was switched off and on (RM0456, SPI
-//! "Procedure for disabling the SPI"; AN5543). So TIM2 asks a DMA channel of each port's own, shortly before CONVST rises, for
-//! two words into CR1: nothing, and SPE. By then the last read-out is over, and the next begins 10 µs later. The two
-//! channels have a request each, because one must not drive two (RM0456, "GPDMA request selection").
+//! A port that has transferred its count of words starts no further transfer on any trigger until
+//! it was disabled and enabled (RM0456, SPI "Procedure for disabling the SPI"; AN5543). Therefore,
+//! shortly before CONVST rises, TIM2 triggers a separate DMA channel for each port, which writes
+//! two words into CR1: zero, then SPE. By then the last read-out is complete, and the next begins
+//! 10 µs later. Each channel has its own request, because one request must not drive two channels
+//! (RM0456, "GPDMA request selection").
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
@@ -17,16 +19,18 @@ use embassy_stm32::pac::{GPDMA1, TIM2};
 use crate::dma::{self, Carries};
 use crate::scans::CONVST_LOW;
 
-/// The DMA channel of either port.
+/// The DMA channel of each port.
 const CHANNELS: [usize; 2] = [4, 5];
-/// Their requests: TIM2's compare channels 2 and 3 (RM0456, "GPDMA1 request assignments"; the same numbers in embassy-stm32's tables).
+/// Their requests: TIM2's compare channels 2 and 3 (RM0456, "GPDMA1 request assignments"; the same
+/// numbers in embassy-stm32's tables).
 const REQUESTS: [u8; 2] = [57, 58];
-/// Counts of TIM2 at which they come: after the period's begin, before CONVST's edge, and not both at once.
+/// Counts of TIM2 at which the requests occur: after the period's begin, before CONVST's edge, and
+/// not simultaneously.
 const AT: [u32; 2] = [CONVST_LOW / 4, CONVST_LOW / 2];
-/// Bytes of the two words.
+/// Length of the two words in bytes.
 const BYTES: u32 = 8;
 
-/// Off, on; and the item of the DMA's list that begins anew with them.
+/// The two words (off, on), and the DMA list item that restarts with them.
 #[repr(C, align(32))]
 struct Shared(UnsafeCell<[u32; 2]>, UnsafeCell<[[u32; 3]; 2]>);
 
@@ -35,13 +39,13 @@ unsafe impl Sync for Shared {}
 
 static SHARED: Shared = Shared(UnsafeCell::new([0; 2]), UnsafeCell::new([[0; 3]; 2]));
 
-/// Leaves port `number` (0 or 1) alone.
+/// Stops restarting port `number` (0 or 1).
 pub fn stop(number: usize) {
     TIM2.dier().modify(|w| w.set_ccde(1 + number, false));
     dma::stop(CHANNELS[number]);
 }
 
-/// Switches a port off and on before each conversion from now on.
+/// Disables and re-enables a port before each conversion from now on.
 pub fn start(number: usize, port: Spi) {
     if cfg!(feature = "busy-interrupt") {
         return;
@@ -69,7 +73,7 @@ pub fn start(number: usize, port: Spi) {
     });
     channel.tr2().write(|w| {
         w.set_dreq(Dreq::DESTINATION_PERIPHERAL);
-        // both words for one request
+        // both words on one request
         w.set_breq(Breq::BLOCK);
         w.set_reqsel(REQUESTS[number]);
     });
@@ -85,7 +89,7 @@ pub fn start(number: usize, port: Spi) {
     TIM2.dier().modify(|w| w.set_ccde(1 + number, true));
 }
 
-/// Whether the channel of port `number` goes round.
+/// Whether the channel of port `number` is running.
 pub fn works(number: usize) -> bool {
     cfg!(feature = "busy-interrupt") || dma::works(CHANNELS[number])
 }

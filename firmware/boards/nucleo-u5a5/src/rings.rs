@@ -1,14 +1,16 @@
-//! From converter to memory without software: BUSY's falling edge starts the serial port, the port's words go
-//! to a ring by GPDMA, block after block, round and round.
+//! Transfers data from the converters to memory without software: BUSY's falling edge starts the
+//! serial port, and GPDMA writes the port's words to a ring, block after block.
 //!
-//! The port works in its autonomous mode (RM0456, "SPI autonomous mode"): an edge of EXTI line 4 or 9 starts a transfer
-//! of nine words, with the select pin driven by the port. Before each conversion a second DMA channel switches the port off
-//! and on, without which it would start no further transfer ([`crate::restart`]). The first follows a closed list of blocks
-//! ([`BLOCKS`]) and interrupts once per block, every 0.29 ms; what an interrupt does is count, and nothing but waking rests on
-//! that: whether a block is whole, in step and not overwritten says the channel's own address ([`Ring::position`]).
+//! The port works in its autonomous mode (RM0456, "SPI autonomous mode"): an edge of EXTI line 4 or
+//! 9 starts a transfer of nine words, with the select pin driven by the port. Before each
+//! conversion a second DMA channel disables and enables the port, which would otherwise start no
+//! further transfer ([`crate::restart`]). The first DMA channel follows a closed list of blocks
+//! ([`BLOCKS`]) and interrupts once per block, every 0.29 ms. The interrupt only counts, and the
+//! count is only used for waking: whether a block is complete, aligned and not overwritten is
+//! determined from the channel's own address ([`Ring::position`]).
 //!
-//! embassy-stm32 0.6.0 has a ring of its own; this one is smaller, never moves, and does not share its known
-//! faults.
+//! embassy-stm32 0.6.0 also has a ring; this one is smaller, never moves, and does not share its
+//! known faults.
 
 use core::cell::UnsafeCell;
 use core::future::poll_fn;
@@ -30,7 +32,7 @@ use crate::{BLOCK_SCANS, restart};
 
 /// Blocks in each ring.
 pub const BLOCKS: u32 = 8;
-/// Words of a ring.
+/// Words in a ring.
 const RING_WORDS: u32 = BLOCKS * BLOCK_SCANS as u32 * SCAN_WORDS;
 
 const _: () = assert!((CHIP_BYTES * BLOCK_SCANS).is_multiple_of(2));
@@ -38,20 +40,23 @@ const _: () = assert!((CHIP_BYTES * BLOCK_SCANS).is_multiple_of(2));
 /// One block of one chip.
 pub type Block = [[u8; CHIP_BYTES]; BLOCK_SCANS];
 
-/// The blocks of both rings: apart from all else, so that they are zeros and take no flash.
+/// The blocks of both rings, kept separate from other data so that they are zero-initialised and
+/// take no flash.
 #[repr(C, align(4))]
 struct Memory(UnsafeCell<[Block; BLOCKS as usize]>);
 
-// SAFETY: written only by the DMA; whoever reads finds out afterwards whether it wrote meanwhile.
+// SAFETY: written only by the DMA; readers check afterwards whether it wrote meanwhile.
 unsafe impl Sync for Memory {}
 
 static MEMORY: [Memory; 2] =
     [const { Memory(UnsafeCell::new([[[0; CHIP_BYTES]; BLOCK_SCANS]; BLOCKS as usize])) }; 2];
 
-/// What the DMA loads to go on with the next block: byte count, destination, and the item after it.
+/// List item that the DMA loads for the next block: byte count, destination, and link to the
+/// following item.
 type Item = [u32; 3];
 
-/// Aligned to more than its size, so that it never crosses a 64 kB page, within which its addresses are.
+/// Aligned to more than its size, so that it never crosses a 64 kB page, to which its addresses are
+/// relative.
 #[repr(C, align(128))]
 struct Items(UnsafeCell<[Item; BLOCKS as usize]>);
 
@@ -64,11 +69,12 @@ static ITEMS: [Items; 2] = [const { Items(UnsafeCell::new([[0; 3]; BLOCKS as usi
 pub struct Ring {
     port: Spi,
     channel: usize,
-    /// Which trigger of the port BUSY's line is (RM0456, SPI trigger table): 4 for EXTI 4, 5 for EXTI 9.
+    /// The port's trigger number for BUSY's line (RM0456, SPI trigger table): 4 for EXTI 4, 5 for
+    /// EXTI 9.
     trigger: u8,
     /// BUSY's pin: EXTI line, and port (A is 0).
     busy: (usize, u8),
-    /// Blocks written since the start, as far as interrupts have told.
+    /// Blocks written since the start, as counted by interrupts.
     written: AtomicU32,
     failed: AtomicBool,
 }
@@ -87,14 +93,14 @@ impl Ring {
 
     /// Stops port and DMA.
     pub fn stop(&self) {
-        // first whoever switches the port on again
+        // first stop the channel that re-enables the port
         restart::stop(self.channel);
         self.port.cr1().modify(|w| w.set_spe(false));
         self.port.autocr().modify(|w| w.set_trigen(false));
         dma::stop(self.channel);
     }
 
-    /// Makes both ready for the next conversion. The pins must have their functions already.
+    /// Prepares port and DMA for the next conversion. The pins must already have their functions.
     pub fn start(&'static self, request: u8) {
         self.stop();
         self.written.store(0, Ordering::Relaxed);
@@ -114,8 +120,8 @@ impl Ring {
             let i = i as u32;
             [count.0, first + i * size_of::<Block>() as u32, link((i + 1) % BLOCKS)]
         });
-        // SAFETY: `stop` has just reset the channel, so that the DMA does not read the list, and nobody else
-        // ever does.
+        // SAFETY: `stop` has just reset the channel, so that the DMA does not read the list, and
+        // nothing else ever does.
         unsafe { ITEMS[self.channel].0.get().write_volatile(list) };
         fence(Ordering::SeqCst);
 
@@ -151,7 +157,8 @@ impl Ring {
         port.cfg1().write(|w| {
             w.set_dsize(15);
             w.set_fthlv(Fthlv::ONE_FRAME);
-            // 160 MHz / 4: 40 MHz; AD7606B Rev. 0, "Timing Specifications", allows it from 2.7 V of VDRIVE on
+            // 160 MHz / 4: 40 MHz; AD7606B Rev. 0, "Timing Specifications", permits it for VDRIVE
+            // of 2.7 V and more
             w.set_mbr(Mbr::DIV4);
             w.set_rxdmaen(true);
         });
@@ -159,8 +166,9 @@ impl Ring {
             w.set_comm(Comm::RECEIVER);
             w.set_master(Master::MASTER);
             w.set_cpol(Cpol::IDLE_HIGH);
-            // The converter puts a bit out on a rising edge, and the next falling one comes before it is valid: it is taken with the
-            // rising edge after that, which puts the next one out (timing in firmware/tests/it/front_end/timing.rs).
+            // The converter outputs a bit on a rising edge, and the next falling edge comes before
+            // it is valid. It is therefore sampled on the following rising edge, which also outputs
+            // the next bit (timing in firmware/tests/it/front_end/timing.rs).
             w.set_cpha(Cpha::SECOND_EDGE);
             // the pins stay driven while the port is off (RM0456, SPI_CFG2, AFCNTR)
             w.set_afcntr(true);
@@ -192,39 +200,43 @@ impl Ring {
         port.cr1().modify(|w| w.set_spe(true));
     }
 
-    /// Block `number`, counted from the start, as it is by now. The DMA may write there meanwhile: only the ring's position, read off
-    /// afterwards, tells that it did not.
+    /// Block `number`, counted from the start, with its present content. The DMA may be writing to
+    /// it; only the ring's position, read afterwards, shows that it did not.
     ///
-    /// Every word is read as a register would be. A reference would promise that nobody writes while it lives, which nobody can for the DMA,
-    /// and its reads might be moved behind the position's.
+    /// Every word is read with a volatile access. A reference would require that nothing writes
+    /// while it exists, which cannot be guaranteed for the DMA, and its reads might be moved after
+    /// that of the position.
     pub fn block(&self, number: u32) -> Block {
         const HALF_WORDS: usize = size_of::<Block>() / 2;
         let ring = core::ptr::from_ref(&MEMORY[self.channel]).cast::<u16>();
         let mut block: Block = [[0; CHIP_BYTES]; BLOCK_SCANS];
         for (place, bytes) in block.as_flattened_mut().chunks_exact_mut(2).enumerate() {
             let place = (number % BLOCKS) as usize * HALF_WORDS + place;
-            // SAFETY: in bounds by the remainder, and aligned as the ring is; half-words are what the DMA writes, each at once.
+            // SAFETY: in bounds because of the remainder, and aligned like the ring; the DMA writes
+            // half-words, each in one access.
             bytes.copy_from_slice(&unsafe { ring.add(place).read_volatile() }.to_ne_bytes());
         }
         block
     }
 
-    /// How far the ring is filled, words from its beginning: the address that the DMA writes next (RM0456, "GPDMA channel x
-    /// destination address register").
+    /// How far the ring is filled, in words from its beginning: the address that the DMA writes
+    /// next (RM0456, "GPDMA channel x destination address register").
     pub fn position(&self) -> u32 {
-        // what was read before is memory, and this is a device: the processor keeps no order between the two by itself
+        // the previous reads access memory, this one a device: the processor does not order the two
+        // by itself
         fence(Ordering::SeqCst);
         let filled = GPDMA1.ch(self.channel).dar().read().wrapping_sub(MEMORY[self.channel].0.get() as u32);
-        // behind the last block, until the list's first is loaded, it is the ring's end
+        // after the last block, until the list's first item is loaded, the address is the ring's
+        // end
         filled / 2 % RING_WORDS
     }
 
-    /// Blocks written since the start, as far as interrupts have told.
+    /// Blocks written since the start, as counted by interrupts.
     pub fn progress(&self) -> u32 {
         self.written.load(Ordering::Relaxed)
     }
 
-    /// Whether the DMA has given up.
+    /// Whether the DMA has stopped with an error.
     pub fn has_failed(&self) -> bool {
         self.failed.load(Ordering::Relaxed)
     }
@@ -250,7 +262,7 @@ impl Ring {
     #[cfg(feature = "busy-interrupt")]
     fn on_busy(&self) {
         EXTI.fpr(0).write(|w| w.set_line(self.busy.0, true));
-        // a port that has finished must be switched off and on to count anew
+        // a port that has finished must be disabled and enabled to count again
         self.port.cr1().modify(|w| w.set_spe(false));
         self.port.ifcr().write(|w| {
             w.set_eotc(true);
@@ -294,7 +306,7 @@ fn EXTI9() {
     SECOND.on_busy();
 }
 
-/// Lets the interrupts of this file through.
+/// Enables the interrupts of this file.
 pub fn enable_interrupts() {
     let numbers: &[interrupt::Interrupt] = if cfg!(feature = "busy-interrupt") {
         &[interrupt::GPDMA1_CHANNEL0, interrupt::GPDMA1_CHANNEL1, interrupt::EXTI4, interrupt::EXTI9]
@@ -302,7 +314,8 @@ pub fn enable_interrupts() {
         &[interrupt::GPDMA1_CHANNEL0, interrupt::GPDMA1_CHANNEL1]
     };
     for number in numbers {
-        // SAFETY: their handlers stand above and touch nothing but atomics and their own peripherals.
+        // SAFETY: their handlers are defined above and access only atomics and their own
+        // peripherals.
         unsafe { number.enable() };
     }
 }

@@ -1,8 +1,9 @@
-//! The board's scans: CONVST from TIM2, counted by TIM5; sixteen channels out of two rings.
+//! The board's scans: CONVST from TIM2, counted by TIM5; sixteen channels from two rings.
 //!
-//! Whatever goes wrong, the count of CONVST goes on, so that the next block says exactly how many scans are missing
-//! before it. The remedy depends on what went wrong: rings that lost step are emptied and joined anew; converters
-//! that fell silent are reset, set up and tested again, over and over, with a report each time the trouble changes.
+//! After any fault the count of CONVST continues, so that the next block states exactly how many
+//! scans are missing before it. The recovery depends on the fault: rings that lost alignment are
+//! emptied and restarted together; converters that fell silent are reset, configured and tested
+//! again, repeatedly, with a report each time the fault changes.
 
 use core::mem::forget;
 
@@ -35,21 +36,22 @@ use core::sync::atomic::Ordering;
 
 /// Counts of the timers per second.
 pub const TIMER_HZ: u32 = 160_000_000;
-/// CONVST is low for the first µs of each period and rises then: counts of TIM2.
+/// CONVST is low for the first µs of each period and then rises: counts of TIM2.
 pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
-/// TIM5 hears of TIM2's update through a synchroniser of some cycles (RM0456, "Timer synchronization"): counts after which it has.
+/// TIM5 receives TIM2's update through a synchroniser of some cycles (RM0456, "Timer
+/// synchronization"): counts after which TIM5 is up to date.
 pub const SETTLED: u32 = 32;
-/// A block takes 0.29 ms; this long without one is silence.
+/// A block takes 0.29 ms; without one for this long, the converters count as silent.
 const PATIENCE: Duration = Duration::from_millis(5);
-/// Between two tries to set silent converters up.
+/// Time between two attempts to set up silent converters.
 const RETRY: Duration = Duration::from_millis(20);
 
-/// What went wrong with the converters.
+/// A fault of the converters.
 #[derive(Debug, PartialEq)]
 enum Fault {
-    /// Which converter, and why it cannot be set up.
+    /// Number of the converter, and why it cannot be set up.
     SetUp(u8, chips::Fault),
-    /// While they ran.
+    /// A fault during acquisition.
     Running(Trouble),
 }
 
@@ -70,7 +72,7 @@ impl From<Trouble> for Fault {
     }
 }
 
-/// What must be done before blocks can come.
+/// The next step before blocks can arrive.
 #[derive(Clone, Copy, PartialEq)]
 enum Next {
     SetUp,
@@ -92,7 +94,7 @@ pub struct Converters {
 }
 
 impl Converters {
-    /// Both timers run from now on; the converters are set up when the first block is asked for.
+    /// Starts both timers; the converters are set up when the first block is requested.
     pub fn new(
         core: &'static Shared,
         chips: Chips,
@@ -130,7 +132,7 @@ impl Converters {
         }
     }
 
-    /// Resets, sets up and tests both, with CONVST as an ordinary pin.
+    /// Resets, configures and tests both converters, with CONVST as an ordinary output pin.
     async fn set_up(&mut self) -> Result<(), Fault> {
         FIRST.stop();
         SECOND.stop();
@@ -141,18 +143,18 @@ impl Converters {
         Ok(())
     }
 
-    /// Starts the rings so that their first scan is the one of the very next period.
+    /// Starts the rings so that their first scan is that of the next period.
     async fn join(&mut self) {
         self.convst.enable_channel(Channel::Ch1, false);
         forget(PwmPin::<'_, peripherals::TIM2, Ch1>::new(self.convst_pin.reborrow(), OutputType::PushPull));
-        // a conversion that is under way ends, and is read by nobody
+        // a conversion in progress ends and is not read
         Timer::after_micros(100).await;
         self.chips.first.ready_for_ring();
         self.chips.second.ready_for_ring();
         FIRST.start(self.chips.first.request());
         SECOND.start(self.chips.second.request());
         self.reader.start(critical_section::with(|_| {
-            // wait for the end of a period (20 µs at most): there is a µs between its end and CONVST's edge
+            // wait for the end of a period (at most 20 µs): CONVST's edge follows 1 µs later
             let before = TIM5.cnt().read();
             while TIM5.cnt().read() == before {}
             self.convst.enable_channel(Channel::Ch1, true);
@@ -161,7 +163,7 @@ impl Converters {
         self.next = Next::Read;
     }
 
-    /// The block that is due, as far as it is good.
+    /// Reads the next block, as far as it is good.
     async fn read(&mut self, block: &mut [u8; BLOCK_SAMPLE_BYTES]) -> Result<Delivered, Trouble> {
         let due = self.reader.due();
         if with_timeout(PATIENCE, rings::arrived(due)).await.is_err() {
@@ -180,7 +182,7 @@ impl Converters {
         Ok(delivered)
     }
 
-    /// Remembers the remedy and reports the fault, unless it is the one reported last.
+    /// Selects the recovery, and reports the fault unless it equals the last report.
     fn report(&mut self, fault: Fault) {
         SCANNING.store(false, Ordering::Relaxed);
         FAULT.store(true, Ordering::Relaxed);
@@ -195,20 +197,22 @@ impl Converters {
     }
 }
 
-/// When the converters are read within a period, in counts of TIM2, and the rings.
+/// Timing of the read-out within a period, in counts of TIM2, and the dimensions of the rings.
 fn alignment() -> Alignment {
     let from_edge = |ns: u32| CONVST_LOW + ns * (TIMER_HZ / 1_000_000) / 1_000;
     let clock = Clock {
         settled: SETTLED,
-        // no averaging ends within half of its longest time
+        // no averaging ends before half of its longest time
         read_from: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 500),
-        // the longest averaging, 144 bits of 25 ns, two idle clocks before and after, and 1 µs for trigger and DMA
+        // the longest averaging, 144 bits of 25 ns, two idle clocks before and after, and 1 µs for
+        // trigger and DMA
         read_by: from_edge(AD7606B.conversion_us(SETTINGS.oversampling) * 1_000 + 148 * 25 + 1_000),
     };
     Alignment { clock, block_scans: BLOCK_SCANS as u32, blocks: BLOCKS }
 }
 
-/// Clock and rings as they are now. Twice the same count of periods around the rest says that all of it is of one period.
+/// Present state of clock and rings. If the count of periods is the same before and after the other
+/// reads, all values belong to one period.
 fn look() -> Moment {
     loop {
         let periods = TIM5.cnt().read();

@@ -1,7 +1,8 @@
-//! What is measured ten times a second by the chip's own converter, ADC1: the bias of the two constant-current supplies, the specimen's
-//! temperature, and whether the USB's 5 V are there.
+//! Values measured ten times a second by the chip's ADC1: the bias of the two constant-current
+//! supplies, the specimen's temperature, and the presence of the USB's 5 V.
 //!
-//! Circuits and pins: docs/WIRING.md. A conversion takes a few µs; nothing waits for it but this task, which runs in thread mode.
+//! Circuits and pins: docs/WIRING.md. A conversion takes a few µs; only this task waits for it, in
+//! thread mode.
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -18,35 +19,36 @@ use crate::channels;
 
 /// Steps of the converter: 14 bits (RM0456, "ADC main features").
 const STEPS: f32 = 16_384.0;
-/// Its reference, V: the board's 3.3 V.
+/// Reference voltage, V: the board's 3.3 V.
 const REFERENCE_V: f32 = 3.3;
-/// From a supply's socket to the pin: 100 kΩ and 10 kΩ.
+/// Divider from a supply's socket to the pin: 100 kΩ and 10 kΩ.
 const BIAS_DIVIDER: f32 = 11.0;
-/// From the USB's 5 V to the pin, as a factor: 330 kΩ and 49.9 kΩ on the Nucleo (not checked against its schematic: measure it once).
+/// Divider from the USB's 5 V to the pin: 330 kΩ and 49.9 kΩ on the Nucleo (not checked against its
+/// schematic: measure it once).
 const VBUS_DIVIDER: f32 = 7.61;
-/// Above this the bus has power, V: behind a hub without power of its own a device still gets 4.35 V (USB 2.0, 7.2.2), less for moments, and at
-/// little more than half of that there is no port.
+/// Threshold above which the bus has power, V: behind a hub without its own supply a device still
+/// gets 4.35 V (USB 2.0, 7.2.2), briefly less; no port supplies as little as about half of that.
 const VBUS_VALID_V: f32 = 2.5;
 const EVERY_MS: u64 = 100;
 
-/// The pins: analog after a reset, and nobody else's. PC0 is ADC1_IN1 and so on (the STM32U5A5's datasheet, "Pin description"; the same
-/// numbers in embassy-stm32's tables).
+/// The pins: analog after a reset, and used only here. PC0 is ADC1_IN1 and so on (the STM32U5A5's
+/// data sheet, "Pin description"; the same numbers in embassy-stm32's tables).
 pub type Pins = (Peri<'static, PC0>, Peri<'static, PC1>, Peri<'static, PC2>, Peri<'static, PC3>);
-/// PC0.
+/// PC0: the Pt1000.
 const THERMOMETER: u8 = 1;
 /// PC1: the hammer's force cell.
 const FORCE: u8 = 2;
-/// PC2.
+/// PC2: the USB's 5 V.
 const VBUS_SENSE: u8 = 3;
 /// PC3: the shaker's force cell.
 const EXCITATION: u8 = 4;
 
 static MEASURED: AtomicBool = AtomicBool::new(false);
 static LATEST: Mutex<RefCell<Option<Slow>>> = Mutex::new(RefCell::new(None));
-/// Until it was measured, it counts as there.
+/// Counts as present until it has been measured.
 static VBUS: AtomicBool = AtomicBool::new(true);
 
-/// Slow values, when they were measured since this was asked last.
+/// Slow values, if measured since the last call.
 pub fn take() -> Option<Slow> {
     if !MEASURED.swap(false, Ordering::Acquire) {
         return None;
@@ -54,21 +56,21 @@ pub fn take() -> Option<Slow> {
     critical_section::with(|section| LATEST.borrow_ref_mut(section).take())
 }
 
-/// Whether the USB's 5 V are there.
+/// Whether the USB's 5 V are present.
 pub fn has_vbus() -> bool {
     VBUS.load(Ordering::Relaxed)
 }
 
-/// Runs for ever.
+/// Runs forever.
 #[embassy_executor::task]
 pub async fn task(adc: Peri<'static, ADC1>, pins: Pins) {
     let mut adc = Adc::new(adc, pins, &[THERMOMETER, FORCE, VBUS_SENSE, EXCITATION]).await;
     loop {
-        // a part of the reference
+        // fraction of the reference
         let mut part = |input| f32::from(adc.read(input)) / STEPS;
         let mut slow = Slow { temperature_c: pt1000_c(part(THERMOMETER)), ..Slow::default() };
         for (channel, input) in [(channels::FORCE, FORCE), (channels::EXCITATION, EXCITATION)] {
-            // two places for two supplies
+            // capacity for two supplies
             let _ =
                 slow.supplies.push(Supply { channel, bias_v: part(input) * (BIAS_DIVIDER * REFERENCE_V) });
         }

@@ -1,11 +1,13 @@
-//! Sync input, sync output and clock input, by TIM3.
+//! Sync input, sync output and clock input, with TIM3.
 //!
-//! TIM3 counts the board's 160 MHz and never stops. Its channel 1 catches the count at each edge of the external clock and says so to TIM2,
-//! whose period begins anew with it; channel 3 catches it at the edges of the sync input. No interrupt and no DMA belongs to it: acquisition
-//! looks once a block, so that no signal at these pins, however fast, takes time from anything.
+//! TIM3 counts the board's 160 MHz and never stops. Its channel 1 captures the count at each edge
+//! of the external clock and triggers TIM2, whose period restarts with it; channel 3 captures the
+//! edges of the sync input. It uses no interrupt and no DMA: acquisition reads it once per block,
+//! so that signals at these pins, however fast, take no processing time.
 //!
-//! With the external clock TIM2's own period is longer by [`FLYWHEEL`]: an edge that does not come lets it go on by itself, late, and no
-//! converter, drive or coil ever waits for a pin. That it is late shows in the counts of a block's scans.
+//! With the external clock, TIM2's own period is longer by [`FLYWHEEL`]: if an edge is missing,
+//! TIM2 continues by itself, late, so that no converter, drive or coil ever waits for a pin. The
+//! delay is visible in the counts of a block's scans.
 
 use core::mem::forget;
 
@@ -22,14 +24,15 @@ use jointrig_protocol::sync::{Clock, ClockFault};
 use crate::SCAN_RATE_HZ;
 use crate::scans::{CONVST_LOW, SETTLED, TIMER_HZ};
 
-/// Counts of a scan.
+/// Counts per scan.
 pub const PERIOD: u32 = TIMER_HZ / SCAN_RATE_HZ;
-/// By how many counts a scan is longer whose edge of the external clock does not come: a hundredth.
+/// Counts by which a scan is longer if its edge of the external clock is missing: one per cent.
 const FLYWHEEL: u32 = PERIOD / 100;
 const RULER: Ruler = Ruler { period: PERIOD, taken_at: CONVST_LOW };
-/// TIM3_CH1 at PC6, TIM3_CH3 at PC8 (the datasheet's "Alternate functions"; the same number in embassy-stm32's tables).
+/// Alternate function of TIM3_CH1 on PC6 and TIM3_CH3 on PC8 (the data sheet's "Alternate
+/// functions"; the same number in embassy-stm32's tables).
 const TIM3_FUNCTION: u8 = 2;
-/// Places of the two channels in TIM3's registers.
+/// Indices of the two channels in TIM3's registers.
 const CLOCK: usize = 0;
 const INPUT: usize = 2;
 
@@ -38,12 +41,12 @@ pub struct Port {
     output: Output<'static>,
     raised: bool,
     external: bool,
-    /// Period and TIM3's count at the last look of a clock that is watched.
+    /// Period and TIM3's count at the last reading of a monitored clock.
     looked: Option<(u32, u32)>,
 }
 
 impl Port {
-    /// Inputs listen, the output is low, the scans have the board's own clock.
+    /// Initialises: inputs enabled, output low, scans timed by the board's own clock.
     pub fn new(
         timer: Peri<'static, peripherals::TIM3>,
         clock: Peri<'static, peripherals::PC6>,
@@ -51,7 +54,7 @@ impl Port {
         output: Peri<'static, peripherals::PD15>,
     ) -> Self {
         for mut pin in [Flex::new(clock), Flex::new(input)] {
-            // pulled down: an open cable is no edge
+            // pulled down: an open cable gives no edge
             pin.set_as_af_unchecked(TIM3_FUNCTION, AfType::input(Pull::Down));
             forget(pin);
         }
@@ -62,11 +65,13 @@ impl Port {
             TIM3.ccmr_input(channel / 2).modify(|w| w.set_ccs(channel % 2, CcmrInputCcs::TI4));
             TIM3.ccer().modify(|w| w.set_cce(channel, true));
         }
-        // each catch of channel 1 is a trigger (RM0456, "TIMx control register 2", MMS: compare pulse)
+        // each capture of channel 1 is a trigger (RM0456, "TIMx control register 2", MMS: compare
+        // pulse)
         TIM3.cr2().modify(|w| w.set_mms(Mms::COMPARE_PULSE));
         timer.start();
         forget(timer);
-        // a new period's length counts from the next period on: TIM2 must never find itself beyond its end
+        // a new period length takes effect with the next period: TIM2's count must never be beyond
+        // its end
         TIM2.cr1().modify(|w| w.set_arpe(true));
         Self {
             output: Output::new(output, Level::Low, Speed::Medium),
@@ -76,7 +81,7 @@ impl Port {
         }
     }
 
-    /// What came since the last look; `next` is the period of the next scan to be delivered.
+    /// Events since the last reading; `next` is the period of the next scan to be delivered.
     pub fn seen(&mut self, next: u32) -> Option<Seen> {
         if core::mem::take(&mut self.raised) {
             self.output.set_low();
@@ -89,7 +94,7 @@ impl Port {
         let (now, phase, count) = look();
         let mut seen = Seen { lost: u32::from(lost), ..Seen::default() };
         if lost {
-            // flags are cleared by writing 0; this writes no other
+            // flags are cleared by writing 0; this clears no other
             let mut others = embassy_stm32::pac::timer::regs::SrGp16(u32::MAX);
             others.set_ccof(INPUT, false);
             TIM3.sr().write_value(others);
@@ -128,7 +133,7 @@ impl Port {
         Ok(())
     }
 
-    /// Raises the output until the next look; when that was.
+    /// Raises the output until the next reading, and returns the instant.
     pub fn mark(&mut self, next: u32) -> Ago {
         let (now, phase, _) = critical_section::with(|_| {
             self.output.set_high();
@@ -139,7 +144,8 @@ impl Port {
     }
 }
 
-/// Count of periods, TIM2's and TIM3's counts at one moment; the last two are read some ten cycles after one another, 0.003 of a scan.
+/// Count of periods and the counts of TIM2 and TIM3 at one moment; the last two are read about ten
+/// cycles apart, 0.003 of a scan.
 fn look() -> (u32, u32, u32) {
     loop {
         let now = TIM5.cnt().read();
@@ -150,10 +156,11 @@ fn look() -> (u32, u32, u32) {
     }
 }
 
-/// Counts between two edges of the external clock, measured for four scans at most with interrupts off: nothing runs by these scans yet.
+/// Counts between two edges of the external clock, measured for at most four scans with interrupts
+/// disabled; nothing depends on these scans yet.
 fn period() -> Option<u32> {
     critical_section::with(|_| {
-        // what was caught before
+        // discard an earlier capture
         TIM3.ccr(CLOCK).read();
         let begun = TIM3.cnt().read();
         let mut first = None;

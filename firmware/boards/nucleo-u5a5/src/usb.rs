@@ -1,4 +1,4 @@
-//! USB: device, receive and transmit in one task, built anew when the bus comes up at the other speed.
+//! USB: device, receive and transmit in one task, rebuilt when the bus comes up at the other speed.
 
 use embassy_futures::select::{select, select3, select4};
 use embassy_stm32::peripherals::{PA11, PA12, USB_OTG_HS};
@@ -18,12 +18,12 @@ pub type Source = usb::Source<'static, Mended<Driver<'static, USB_OTG_HS>, Otg>>
 /// Bytes to the host.
 pub type Sink = usb::Sink<'static, Mended<Driver<'static, USB_OTG_HS>, Otg>>;
 
-/// Packets that wait for their readers: two bulk endpoints, the control endpoint.
+/// Buffer for received packets: two bulk endpoints, the control endpoint.
 const RECEIVED_BYTES: usize = 2 * 512 + 64 + 64;
-/// Between two signs of life. 400 frames of high speed and 50 of full speed: no multiple of the 16 384 after which their number
-/// comes round.
+/// Interval between two signs of life. It is 400 frames at high speed and 50 at full speed: not a
+/// multiple of the 16 384 after which the frame number wraps.
 const BEAT: Duration = Duration::from_millis(50);
-/// Between two looks at the speed.
+/// Interval between two checks of the speed.
 const LOOK: Duration = Duration::from_millis(10);
 /// DSTS.ENUMSPD of a high-speed bus; every other value is full speed.
 const ENUMERATED_HIGH: u8 = 0;
@@ -32,14 +32,15 @@ bind_interrupts!(struct Irqs {
     OTG_HS => InterruptHandler<USB_OTG_HS>;
 });
 
-/// The core's registers (RM0456, "OTG_HS device registers"; the bits are also those of the driver's own register table).
+/// The core's registers (RM0456, "OTG_HS device registers"; the bits also match the driver's own
+/// register table).
 pub struct Otg;
 
 impl Registers for Otg {
     fn forget_suspend(&mut self) {
         let otg = pac::USB_OTG_HS;
         if !otg.dsts().read().suspsts() {
-            // bits are cleared by writing them; this writes no other
+            // bits are cleared by writing 1; this clears no other
             otg.gintsts().write(|w| w.set_usbsusp(true));
         }
     }
@@ -53,7 +54,7 @@ impl Registers for Otg {
     }
 }
 
-/// Runs for ever.
+/// Runs forever.
 #[embassy_executor::task]
 pub async fn task(
     core: &'static Shared,
@@ -87,10 +88,11 @@ pub async fn task(
         )
         .await;
         speed = enumerated().unwrap_or(speed);
-        // whatever was on its way is lost, and nobody can take back what was ordered
+        // data in transit are lost, and requests can no longer be cancelled
         core.link_is_cut();
         if !slow::has_vbus() {
-            // a device without power from the bus holds none of its lines up (USB 2.0, 7.1.5 and 7.2.1)
+            // a device without bus power must not pull up any of its lines (USB 2.0, 7.1.5 and
+            // 7.2.1)
             pac::USB_OTG_HS.dctl().modify(|w| w.set_sdis(true));
             select(beat(), vbus(true)).await;
         }
@@ -98,7 +100,7 @@ pub async fn task(
     }
 }
 
-/// The speed of the bus, once the host has given us an address on it.
+/// The speed of the bus, once the host has assigned an address.
 fn enumerated() -> Option<Speed> {
     let otg = pac::USB_OTG_HS;
     if otg.dcfg().read().dad() == 0 {
@@ -108,23 +110,25 @@ fn enumerated() -> Option<Speed> {
     Some(if high { Speed::High } else { Speed::Full })
 }
 
-/// Waits until the bus has power, or has none. The driver's own detection wants VBUS at PA9, which on the Nucleo is the ST-LINK's serial
-/// port; the board brings it to PC2 instead (docs/WIRING.md).
+/// Waits until the bus has power, or has none. The driver's own detection requires VBUS at PA9,
+/// which on the Nucleo is the ST-LINK's serial port; the board connects VBUS to PC2 instead
+/// (docs/WIRING.md).
 async fn vbus(there: bool) {
     while slow::has_vbus() != there {
         Timer::after(LOOK).await;
     }
 }
 
-/// Waits until the bus is of another speed than the descriptors are for.
+/// Waits until the bus speed differs from that of the descriptors.
 async fn other_than(speed: Speed) {
     while enumerated().is_none_or(|found| found == speed) {
         Timer::after(LOOK).await;
     }
 }
 
-/// Beats while the bus makes progress, or has no host to make any with: on a bus that runs the number of the frame moves every
-/// millisecond (USB 2.0, 5.3.3), whatever the host reads. A core that is configured and stands still is one that hangs.
+/// Signals life while the bus makes progress, or while there is no host: on an active bus, the
+/// frame number changes every millisecond (USB 2.0, 5.3.3), whether or not the host reads. A core
+/// that is configured and whose frame number does not change has hung.
 async fn beat() -> ! {
     let mut before = None;
     loop {

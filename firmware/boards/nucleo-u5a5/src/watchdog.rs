@@ -1,9 +1,10 @@
 //! The independent watchdog: fed only while acquisition and link are alive.
 //!
-//! Each of the two beats from where it does its work: acquisition with every block (or every failed try to get
-//! one), the link from the executor that runs USB while the bus moves or has no host. A host that is not there, or converters that are broken,
-//! are not reasons for a reset; a task that hangs is. The watchdog runs from its own oscillator, and nothing
-//! stops it but a reset, which drops the coil.
+//! Each signals life from where it does its work: acquisition with every block (or every failed
+//! attempt to get one), the link from the executor that runs USB, while the bus makes progress or
+//! has no host. A missing host or faulty converters are not reasons for a reset; a task that hangs
+//! is. The watchdog runs from its own oscillator and can only be stopped by a reset, which switches
+//! the coil off.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -12,21 +13,21 @@ use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Timer};
 
-/// Unfed for this long, it resets: µs.
+/// Timeout without feeding, µs.
 const TIMEOUT_US: u32 = 500_000;
-/// How often both are looked at. Three looks without a beat still fit the timeout.
+/// Interval between checks of both. Three checks without a sign of life still fit the timeout.
 const PERIOD: Duration = Duration::from_millis(125);
 
-/// One part's signs of life.
+/// Signs of life of one part.
 pub struct Beats(AtomicU32);
 
-/// Of acquisition.
+/// Signs of life of acquisition.
 pub static ACQUISITION: Beats = Beats(AtomicU32::new(0));
-/// Of the link.
+/// Signs of life of the link.
 pub static LINK: Beats = Beats(AtomicU32::new(0));
 
 impl Beats {
-    /// Still here.
+    /// Signals life.
     pub fn beat(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
@@ -36,14 +37,14 @@ impl Beats {
     }
 }
 
-/// Starts it; from now on it must be fed.
+/// Starts the watchdog; it must be fed from now on.
 pub fn start(peripheral: Peri<'static, IWDG>) -> IndependentWatchdog<'static, IWDG> {
     let mut dog = IndependentWatchdog::new(peripheral, TIMEOUT_US);
     dog.unleash();
     dog
 }
 
-/// Feeds it while both are alive. Runs for ever.
+/// Feeds the watchdog while both parts are alive. Runs forever.
 #[embassy_executor::task]
 pub async fn task(mut dog: IndependentWatchdog<'static, IWDG>) {
     let mut before = None;

@@ -1,4 +1,4 @@
-//! The converter's driver against a register-level model of the converter.
+//! Tests of the converter's driver with a register-level model of the converter.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod model;
@@ -17,7 +17,7 @@ fn chip(faults: Faults) -> (Model, Chip) {
     (model, chip)
 }
 
-/// Reset and set up, as a board does it.
+/// Resets and configures the chip, as a board does.
 fn ready(settings: &Settings) -> (Model, Chip) {
     let (model, mut chip) = chip(Faults::default());
     chip.reset(&mut model.clock()).unwrap();
@@ -121,7 +121,7 @@ fn busy_stuck_is_an_error_after_a_bounded_time_and_the_chip_says_so_too() {
     assert!(model.with(|state| state.now_ns) - before < 32_000);
     assert_eq!(chip.digital_errors().unwrap(), registers::BUSY_STUCK_HIGH);
     assert_eq!(chip.digital_errors().unwrap(), 0, "asking clears");
-    // and it recovers: reset, settings, conversion
+    // and it recovers with reset, settings, conversion
     model.with(|state| state.faults.busy_stuck = false);
     chip.reset(&mut model.clock()).unwrap();
     chip.configure(&Settings::default()).unwrap();

@@ -1,5 +1,5 @@
-//! The converter as its data sheet describes it: registers, the two modes of the port, RESET, CONVST and BUSY
-//! with their times, CRCs; and the ways in which it can fail. Time is data: whoever waits moves it.
+//! Model of the converter as in its data sheet: registers, the two modes of the port, RESET, CONVST
+//! and BUSY with their timing, CRCs; and possible faults. Time is simulated: each wait advances it.
 
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -10,7 +10,7 @@ use std::task::Poll;
 use embedded_hal::digital::{ErrorType as PinError, OutputPin};
 use embedded_hal::spi::{ErrorType as SpiError, Operation, SpiDevice};
 
-/// What is wrong with the chip or its wires.
+/// Faults of the chip or its wiring.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "faults come in any combination")]
 pub struct Faults {
@@ -18,19 +18,19 @@ pub struct Faults {
     pub busy_stuck: bool,
     /// This bit of every conversion's frame arrives inverted.
     pub flipped_bit: Option<usize>,
-    /// The answers to register reads arrive with their lowest data bit inverted.
+    /// The values returned by register reads arrive with their lowest data bit inverted.
     pub bad_answers: bool,
-    /// Another chip's ID.
+    /// The ID of another chip.
     pub id: Option<u8>,
-    /// Writes to the range registers are lost.
+    /// Writes to the range registers are ignored.
     pub ranges_stick: bool,
-    /// DOUTA is not connected: a pull-up.
+    /// DOUTA is not connected; a pull-up holds it high.
     pub no_dout: bool,
     /// RESET is not connected.
     pub no_reset: bool,
 }
 
-/// The chip's inside.
+/// Internal state of the chip.
 pub struct State {
     pub faults: Faults,
     /// Volts at V1 to V8.
@@ -100,7 +100,7 @@ impl State {
         }
     }
 
-    /// One frame of CS: what comes out while `sdi` goes in.
+    /// One frame of CS: returns the output while `sdi` is the input.
     fn frame(&mut self, sdi: &[u8]) -> Vec<u8> {
         if self.faults.no_dout || self.now_ns < self.ready_at_ns {
             return vec![0xFF; sdi.len()];
@@ -179,7 +179,7 @@ fn crc16(data: &[u8]) -> u16 {
     divide::<16>(0x755B, data) as u16
 }
 
-/// The chip with its pins.
+/// The chip and its pins.
 #[derive(Clone)]
 pub struct Model(Rc<RefCell<State>>);
 
@@ -204,7 +204,7 @@ impl Model {
             quiet: 0,
         };
         state.full_reset();
-        // a chip that was powered long ago and whose status somebody has read
+        // a chip powered up earlier, whose status was already read
         state.registers[0x01] = 0;
         state.ready_at_ns = 0;
         Self(Rc::new(RefCell::new(state)))
@@ -354,7 +354,7 @@ impl embedded_hal_async::delay::DelayNs for Clock {
     async fn delay_ns(&mut self, ns: u32) {
         let end = self.0.with(|state| state.now_ns) + u64::from(ns);
         poll_fn(|context| {
-            // a tenth of a µs per look, so that whoever else waits sees its own instant
+            // 0.1 µs per poll, so that other waiting tasks observe the instants they wait for
             let now = self.0.with(|state| {
                 state.now_ns += 100;
                 state.now_ns

@@ -1,4 +1,4 @@
-//! The driver: what PULSE, PERMIT and two one-shots make of the MOSFET's gate.
+//! The coil driver: how PULSE, PERMIT and two one-shots determine the MOSFET's gate.
 //!
 //! ```text
 //! gate  = PULSE · A · PERMIT · not B      (74HCT21, then TC4427)
@@ -8,17 +8,17 @@
 
 use crate::coil_driver::one_shot::{Edge, OneShot, nominal_s};
 
-/// What ends a pulse that PULSE does not end: 100 kΩ and 150 nF.
+/// Pulse length of one-shot A, which ends a pulse that PULSE does not end: 100 kΩ and 150 nF.
 pub const A_S: f64 = nominal_s(100e3, 150e-9);
-/// What keeps the next pulse away: 680 kΩ and 1 µF.
+/// Pulse length of one-shot B, which blocks the next pulse: 680 kΩ and 1 µF.
 pub const B_S: f64 = nominal_s(680e3, 1e-6);
 
-/// What a wire does.
+/// State of a wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wire {
     Low,
     High,
-    /// Nothing: the pin floats, or the wire is off.
+    /// Not driven: the pin floats, or the wire is disconnected.
     Open,
 }
 
@@ -34,14 +34,14 @@ impl Wire {
     }
 }
 
-/// An input with or without the resistor that holds it low.
+/// An input with or without a pull-down resistor.
 #[derive(Clone, Copy, Debug)]
 pub struct Input {
     pub pulled_down: bool,
 }
 
 impl Input {
-    /// The level; an input that nothing holds takes what noise makes it.
+    /// The level; a floating input follows the noise.
     fn level(self, wire: Wire, noise: bool) -> bool {
         match wire {
             Wire::Low => false,
@@ -51,14 +51,14 @@ impl Input {
     }
 }
 
-/// What comes from outside.
+/// External conditions.
 #[derive(Clone, Copy, Debug)]
 pub struct Outside {
     pub pulse: Wire,
     pub permit: Wire,
-    /// The driver's own 5 V.
+    /// The driver's own 5 V supply is present.
     pub logic_supply: bool,
-    /// What a floating input would take.
+    /// Level of a floating input.
     pub noise: bool,
 }
 
@@ -68,7 +68,7 @@ impl Outside {
     }
 }
 
-/// The driver.
+/// The coil driver.
 #[derive(Clone, Copy, Debug)]
 pub struct Driver {
     pub pulse: Input,
@@ -78,7 +78,7 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// As drawn; `scale` is what tolerances make of both one-shots.
+    /// The circuit as drawn; `scale` is the tolerance factor of each one-shot.
     pub fn new(scale: [f64; 2]) -> Self {
         Self {
             pulse: Input { pulled_down: true },
@@ -88,15 +88,15 @@ impl Driver {
         }
     }
 
-    /// The gate with these levels, whatever led to the one-shots' state.
+    /// The gate level for these inputs and the present state of the one-shots.
     pub fn gate(&self, outside: Outside) -> bool {
         let pulse = self.pulse.level(outside.pulse, outside.noise);
         let permit = self.permit.level(outside.permit, outside.noise);
-        // without its supply the TC4427 drives nothing, and 10 kΩ hold the gate
+        // without its supply the TC4427 is inactive, and 10 kΩ hold the gate low
         outside.logic_supply && pulse && permit && self.a.runs() && !self.b.runs()
     }
 
-    /// Time passes with these levels; whether the gate is on at the end.
+    /// Advances the time with these levels; returns whether the gate is on at the end.
     pub fn step(&mut self, outside: Outside, seconds: f64) -> bool {
         let pulse = self.pulse.level(outside.pulse, outside.noise);
         let permit = self.permit.level(outside.permit, outside.noise);

@@ -1,11 +1,12 @@
-//! Whether the levels between the parts fit.
+//! Checks that the signal levels between the parts are compatible.
 
-/// Lowest level that a pin at 3.3 V gives for a 1, V: VDD − 0.4 V (STM32U5A5 data sheet, "Output voltage characteristics").
+/// Lowest output voltage of a 3.3 V pin for a 1, V: VDD − 0.4 V (STM32U5A5 data sheet, "Output
+/// voltage characteristics").
 const PIN_HIGH_V: f64 = 3.3 * 0.97 - 0.4;
-/// Highest level of a 0, V.
+/// Highest output voltage for a 0, V.
 const PIN_LOW_V: f64 = 0.4;
 
-/// What an input takes for a 0 and for a 1, V.
+/// Input thresholds for 0 and 1, V.
 struct Thresholds {
     low_v: f64,
     high_v: f64,
@@ -17,7 +18,7 @@ const HCT: Thresholds = Thresholds { low_v: 0.8, high_v: 2.0 };
 const HC: Thresholds = Thresholds { low_v: 0.3 * 5.0, high_v: 0.7 * 5.0 };
 /// TC4427 (Microchip DS20001422, "Electrical characteristics").
 const TC4427: Thresholds = Thresholds { low_v: 0.8, high_v: 2.4 };
-/// A gate of HCT at 4.5 V and 4 mA: 0 and 1, V (the same sheets).
+/// Output of an HCT gate at 4.5 V and 4 mA: 0 and 1, V (the same data sheets).
 const HCT_OUT_V: [f64; 2] = [0.33, 3.84];
 
 fn fits(low_v: f64, high_v: f64, input: &Thresholds) -> bool {
@@ -34,10 +35,11 @@ fn a_pin_of_3_3_volts_drives_hct_and_would_not_drive_hc() {
 #[test]
 fn pull_downs_hold_against_every_leakage_and_load_no_pin() {
     const PULL_DOWN_OHM: f64 = 10e3;
-    // an HCT input, a floating pin of the controller, 100 mm of trace: 1 µA each at the most
+    // an HCT input, a floating pin of the controller, 100 mm of trace: at most 1 µA each
     const { assert!(3e-6 * PULL_DOWN_OHM < 0.1 * HCT.low_v) };
-    // a pin gives 8 mA with the levels above
+    // a pin supplies 8 mA at the levels above
     const { assert!(PIN_HIGH_V / PULL_DOWN_OHM < 0.1 * 8e-3) };
-    // the MOSFET's gate: IRLZ44N, threshold 1 V at least, leakage 100 nA, its driver without supply 10 µA
+    // the MOSFET's gate: IRLZ44N, threshold at least 1 V, leakage 100 nA, its driver without supply
+    // 10 µA
     const { assert!(10.1e-6 * PULL_DOWN_OHM < 0.2) };
 }

@@ -1,7 +1,8 @@
-//! The hammer's coil driver and its guard chain as circuits (docs/WIRING.md): what the gate does for every input at 0, at 1 and with its wire off, how
-//! long a pulse and how short a pause the hardware alone allows, and whether levels, currents and times fit the parts.
+//! The hammer's coil driver and its guard chain, modelled as circuits (docs/WIRING.md): the gate
+//! for every input at 0, at 1 and disconnected, the longest pulse and the shortest pause that the
+//! hardware alone permits, and whether levels, currents and times suit the parts.
 //!
-//! docs/WIRING.md and docs/safety.md hold the tables that these tests make, word for word.
+//! docs/WIRING.md and docs/safety.md contain the tables that these tests generate, verbatim.
 #![allow(clippy::unwrap_used)]
 
 mod chain;
@@ -14,7 +15,7 @@ mod truth_table;
 
 use std::path::Path;
 
-/// Asserts that a page of the documentation holds these lines.
+/// Asserts that a page of the documentation contains these lines.
 fn page_holds(page: &str, lines: &[String]) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(page);
     let text = std::fs::read_to_string(&path).unwrap();

@@ -1,10 +1,11 @@
 //! One half of a 74HCT4538.
 //!
-//! Nexperia, 74HC4538; 74HCT4538, Rev. 4 (2016): nB is the rising trigger, nA the falling one, a LOW at nCD ends the pulse and forbids triggering
-//! (section 1, "Functional description"), and the pulse lasts 0.7 R C. Unlike a 74HC123 it is not triggered by the end of a reset.
+//! Nexperia, 74HC4538; 74HCT4538, Rev. 4 (2016): nB is the rising-edge trigger, nA the falling-edge
+//! one, a LOW at nCD ends the pulse and inhibits triggering (section 1, "Functional description"),
+//! and the pulse lasts 0.7 R C. Unlike a 74HC123, it is not triggered by the end of a reset.
 
-/// By how much a pulse may differ from 0.7 R C. The sheet's output pulse of 0.7 ms (10 kΩ, 0.1 µF) is taken as ± 14 % over temperature,
-/// resistors have 1 %, film capacitors 5 %.
+/// Tolerance of the pulse length relative to 0.7 R C. The data sheet's output pulse of 0.7 ms (10
+/// kΩ, 0.1 µF) is taken as ± 14 % over temperature; resistors have 1 %, film capacitors 5 %.
 pub const TOLERANCE: f64 = 0.14 + 0.01 + 0.05;
 
 /// Nominal length of a pulse, s.
@@ -12,7 +13,7 @@ pub const fn nominal_s(ohm: f64, farad: f64) -> f64 {
     0.7 * ohm * farad
 }
 
-/// Which edge of its trigger starts it.
+/// The edge of its trigger that starts it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edge {
     Rising,
@@ -30,12 +31,12 @@ pub struct OneShot {
 }
 
 impl OneShot {
-    /// At rest, its trigger low.
+    /// At rest, with its trigger low.
     pub fn new(edge: Edge, retriggerable: bool, width_s: f64) -> Self {
         Self { edge, retriggerable, width_s, trigger: false, left_s: 0.0 }
     }
 
-    /// The state in which it wakes when the supply comes: nobody knows which.
+    /// The state at power-up, which is undefined.
     pub fn woken(mut self, running: bool, trigger: bool) -> Self {
         self.left_s = if running { self.width_s } else { 0.0 };
         self.trigger = trigger;
@@ -47,7 +48,7 @@ impl OneShot {
         self.left_s > 0.0
     }
 
-    /// Whether its trigger is such that it would start now, were it not reset.
+    /// Whether its trigger would start it now if it were not reset.
     fn triggered(&self, level: bool) -> bool {
         let edge = match self.edge {
             Edge::Rising => level && !self.trigger,
@@ -56,7 +57,7 @@ impl OneShot {
         edge && (self.retriggerable || !self.runs())
     }
 
-    /// The levels at trigger and nCD become these, and time passes.
+    /// Sets the levels at trigger and nCD, and advances the time.
     pub fn step(&mut self, trigger: bool, not_reset: bool, seconds: f64) {
         self.left_s = (self.left_s - seconds).max(0.0);
         if self.triggered(trigger) {

@@ -1,10 +1,12 @@
-//! What the coil does in the states that a controller can be in. The page docs/safety.md holds this table.
+//! Behaviour of the coil in each state that the controller can be in. docs/safety.md contains this
+//! table.
 
 use crate::coil_driver::driver::{Driver, Outside, Wire};
 use crate::coil_driver::page_holds;
 use crate::coil_driver::timing::{CORNERS, LONGEST_PULSE_S, STEP_S, pulses};
 
-/// The worst of what happens in a state: the longest pulse over all corners and what noise would do, ms; 0 for none. No state gives two within the pause.
+/// The worst case in a state: the longest pulse over all tolerance corners and noise, s; 0 for
+/// none. No state gives two pulses within the pause.
 fn worst_s(begin: impl Fn(Driver) -> Driver, outside: impl Fn(f64, bool) -> Outside) -> f64 {
     let mut longest = 0.0_f64;
     for corner in CORNERS {

@@ -1,12 +1,12 @@
-//! How long a pulse and how short a pause the hardware allows, whatever comes.
+//! The longest pulse and the shortest pause that the hardware permits, for any input.
 
 use crate::coil_driver::driver::{A_S, B_S, Driver, Outside, Wire};
 use crate::coil_driver::one_shot::TOLERANCE;
 
-/// One step, s.
+/// Time step, s.
 pub const STEP_S: f64 = 10e-6;
 
-/// Extremes of both one-shots.
+/// Tolerance extremes of both one-shots.
 pub const CORNERS: [[f64; 2]; 4] = [
     [1.0 - TOLERANCE, 1.0 - TOLERANCE],
     [1.0 - TOLERANCE, 1.0 + TOLERANCE],
@@ -39,7 +39,7 @@ pub fn pulses(driver: &mut Driver, seconds: f64, outside: impl Fn(f64) -> Outsid
 
 /// PULSE is high from `from` for `width`, s.
 fn high(at: f64, from: f64, width: f64) -> Wire {
-    // half a step off the edges, so that rounding decides nothing
+    // half a step away from the edges, so that rounding has no effect
     let at = at + 0.5 * STEP_S;
     if at > from && at < from + width { Wire::High } else { Wire::Low }
 }
@@ -59,7 +59,7 @@ fn a_shot_lasts_as_long_as_it_was_ordered() {
 
 #[test]
 fn the_firmwares_longest_pulse_fits_and_its_pause_is_longer_than_the_drivers() {
-    // 8 ms ordered, 8.2 ms at most by the timer's sixteen bits at 8 MHz
+    // 8 ms requested; at most 8.2 ms by the 16-bit timer at 8 MHz
     const TIMER_S: f64 = 65_535.0 / 8e6;
     const { assert!(TIMER_S < SHORTEST_A_S) };
     let pause_s = f64::from(jointrig_firmware::hammer::PAUSE_MS) * 1e-3;
@@ -74,7 +74,7 @@ fn a_pin_that_hangs_high_gives_one_pulse_and_closing_the_guard_gives_none() {
         assert_eq!(found.len(), 1);
         assert!(found[0][1] - found[0][0] <= LONGEST_PULSE_S + 2.0 * STEP_S);
 
-        // the guard closes while the pin hangs: A is reset until then, and wants an edge
+        // the guard closes while the pin is stuck high: A is reset until then, and needs an edge
         let found = pulses(&mut Driver::new(corner), 3.0, |at| {
             Outside::new(high(at, 0.01, 10.0), if at < 1.0 { Wire::Low } else { Wire::High })
         });
@@ -90,7 +90,7 @@ fn an_order_within_the_pause_gives_no_pulse_not_even_a_late_one() {
     };
     for corner in CORNERS {
         let end = 0.013 + B_S * corner[1];
-        // 4 ms before the pause ends the pin rises, and is high when it ends
+        // the pin rises 4 ms before the pause ends, and is high when it ends
         let found =
             pulses(&mut Driver::new(corner), 1.0, |at| Outside::new(second(at, end - 4e-3), Wire::High));
         assert_eq!(found.len(), 1, "{found:?}");
@@ -111,7 +111,8 @@ fn opening_the_guard_ends_a_pulse_and_closing_it_does_not_resume_it() {
     assert!((found[0][1] - 0.012).abs() < 1.5 * STEP_S);
 }
 
-/// A pin gone wild in every way that a seed draws: telegraphs of all speeds at PULSE and PERMIT, wires that come and go.
+/// A pin with random behaviour from many seeds: random telegraph signals of all rates at PULSE and
+/// PERMIT, and wires that disconnect and reconnect.
 #[test]
 fn no_program_makes_a_pulse_longer_or_a_pause_shorter() {
     let mut pulses_seen = 0;

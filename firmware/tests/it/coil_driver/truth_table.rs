@@ -4,7 +4,7 @@ use crate::coil_driver::driver::{A_S, B_S, Driver, Outside, WIRES, Wire};
 use crate::coil_driver::one_shot::{Edge, OneShot};
 use crate::coil_driver::page_holds;
 
-/// Both one-shots in these states.
+/// A driver with both one-shots in these states.
 fn in_state(a: bool, b: bool) -> Driver {
     let driver = Driver::new([1.0; 2]);
     Driver {
@@ -26,7 +26,7 @@ fn the_gate_is_on_for_one_row_of_thirty_six_and_the_page_says_which() {
     for pulse in WIRES {
         for permit in WIRES {
             let gates = STATES.map(|(a, b)| {
-                // a level that no resistor holds would differ with the noise
+                // a level not held by a resistor would depend on the noise
                 let [quiet, loud] = [false, true].map(|noise| {
                     let outside = Outside { noise, ..Outside::new(pulse, permit) };
                     in_state(a, b).gate(outside)
@@ -56,7 +56,8 @@ fn without_its_supply_the_gate_is_off() {
     }
 }
 
-/// The circuit as it was before: neither resistor, PULSE at the one-shot alone. What the table is worth shows where it fails.
+/// An earlier circuit with one of the pull-downs missing: shows that the table check fails without
+/// it.
 #[test]
 fn each_pull_down_is_needed() {
     for (pulse, permit) in [(false, true), (true, false)] {

@@ -1,38 +1,39 @@
-//! Register model of what reads two converters without the CPU: the clock of CONVST with its count of periods, either chip's BUSY,
-//! a port that must be switched off and on between two transfers, and a DMA channel that writes its ring.
+//! Register model of the hardware that reads two converters without the CPU: the CONVST clock with
+//! its count of periods, the BUSY signal of each chip, an SPI port that must be disabled and
+//! enabled between two transfers, and a DMA channel that writes its ring.
 
 use jointrig_firmware::ad7606b::alignment::{Clock, Moment, SCAN_WORDS};
 use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc};
 
 /// Counts of the timer in a period, as on the board: 160 MHz / 51 200 Hz.
 pub const PERIOD: u64 = 3_125;
-/// When the ports are switched off and on.
+/// Timer count at which the ports are disabled and enabled.
 pub const RESTART: u64 = 40;
 const EDGE: u64 = 160;
 const CONVERSION: u64 = 1_584;
-/// Counts for a word: 16 bits of 25 ns.
+/// Timer counts per word: 16 bits of 25 ns.
 const WORD: u64 = 64;
 pub const BLOCK_SCANS: usize = 15;
 pub const BLOCKS: usize = 8;
 const RING_WORDS: usize = BLOCKS * BLOCK_SCANS * SCAN_WORDS as usize;
-/// As the board has it.
+/// The same values as on the board.
 pub const CLOCK: Clock = Clock { settled: 32, read_from: 960, read_by: 2_512 };
 
-/// What happens to one read-out of one chip.
+/// A fault in one read-out of one chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slip {
-    /// BUSY's fall is not seen.
+    /// The falling edge of BUSY is missed.
     Missed,
     /// A glitch on BUSY starts a second read-out.
     Twice,
-    /// One word is lost on its way.
+    /// One word is lost in transfer.
     WordLost,
 }
 
-/// The port, as far as RM0456 says what starts a transfer.
+/// The SPI port, as far as RM0456 specifies what starts a transfer.
 #[derive(Clone, Copy, Default)]
 struct Port {
-    /// SPE was set after the last transfer had ended.
+    /// SPE was set after the last transfer ended.
     ready: bool,
 }
 
@@ -42,7 +43,7 @@ impl Port {
         self.ready = spe;
     }
 
-    /// A trigger; whether a transfer starts.
+    /// A trigger; returns whether a transfer starts.
     fn trigger(&mut self) -> bool {
         std::mem::take(&mut self.ready)
     }
@@ -55,31 +56,31 @@ struct Chip {
     written: u64,
 }
 
-/// Both chips and the clock, scan by scan.
+/// Both chips and the clock, simulated scan by scan.
 pub struct Hardware {
     chips: [Chip; 2],
     /// Whether a DMA channel restarts the ports.
     restarts: bool,
     slip: Option<(u64, usize, Slip)>,
-    /// Read-outs under way or to come: (instant of its end, chip, word).
+    /// Words being read or to be read: (instant of their end, chip, word).
     pending: Vec<(u64, usize, u16)>,
-    /// Up to here all has happened.
+    /// Simulated up to this instant, in counts.
     now: u64,
 }
 
 impl Hardware {
-    /// Started, with a slip of one chip at one scan.
+    /// Starts the hardware, with a slip of one chip at one scan.
     pub fn new(restarts: bool, slip: Option<(u64, usize, Slip)>) -> Self {
         let chip = || Chip { port: Port { ready: true }, ring: vec![0; RING_WORDS], written: 0 };
         Self { chips: [chip(), chip()], restarts, slip, pending: Vec::new(), now: 0 }
     }
 
-    /// A channel's code in a scan: everybody's is another.
+    /// The code of a channel in a scan; different for every channel.
     pub fn code(scan: u64, channel: usize) -> i16 {
         (scan * 31 + channel as u64 * 977) as i16
     }
 
-    /// Lets time go on to this instant, in counts.
+    /// Advances the time to this instant, in counts.
     pub fn go_on(&mut self, until: u64) {
         while self.now < until {
             let (scan, phase) = (self.now / PERIOD, self.now % PERIOD);
@@ -113,7 +114,7 @@ impl Hardware {
         let times = if slip == Some(Slip::Twice) { 2 } else { 1 };
         for time in 0..times {
             if time == 1 {
-                // the glitch comes together with a restart, or nothing would come of it
+                // the glitch coincides with a restart, otherwise it would have no effect
                 self.chips[number].port.cr1(true);
             }
             if !self.chips[number].port.trigger() {
@@ -135,7 +136,7 @@ impl Hardware {
         self.chips.iter().all(|chip| chip.written >= end)
     }
 
-    /// A block of one chip as it lies in memory now.
+    /// A block of one chip as it is in memory now.
     pub fn block(&self, chip: usize, number: u32) -> Vec<[u8; CHIP_BYTES]> {
         let words = BLOCK_SCANS * SCAN_WORDS as usize;
         let begin = number as usize % BLOCKS * words;
@@ -144,13 +145,13 @@ impl Hardware {
         bytes.as_chunks().0.to_vec()
     }
 
-    /// What the program reads off now.
+    /// The values that the program reads now.
     pub fn look(&self) -> Moment {
         let words = [0, 1].map(|chip: usize| (self.chips[chip].written % RING_WORDS as u64) as u32);
         Moment { periods: (self.now / PERIOD) as u32, phase: (self.now % PERIOD) as u32, words }
     }
 
-    /// The instant, in counts.
+    /// The present instant, in counts.
     pub fn now(&self) -> u64 {
         self.now
     }

@@ -1,5 +1,6 @@
-//! Two converters that are read without the CPU: slips of every kind, a program that looks at any time, and ports that need a restart,
-//! against a model of the registers; and the timing of a bit on its way, from the datasheets.
+//! Tests of two converters that are read without the CPU, with a model of the registers: slips of
+//! every kind, a program that reads at any time, and ports that need a restart; and the timing of a
+//! bit, from the data sheets.
 
 mod hardware;
 mod noise;
@@ -16,8 +17,9 @@ fn alignment() -> Alignment {
     Alignment { clock: CLOCK, block_scans: BLOCK_SCANS as u32, blocks: BLOCKS as u32 }
 }
 
-/// Reads until trouble or until so many blocks have come, each time as many counts late as `late` says. Every scan that is
-/// delivered is held to what was converted. What came, and how it ended.
+/// Reads until a fault occurs or `blocks` blocks have arrived; `late` gives the delay of each read
+/// in counts. Compares every delivered scan with the converted values. Returns the number of scans
+/// and the fault.
 fn read(hardware: &mut Hardware, blocks: u32, mut late: impl FnMut(u32) -> u64) -> (u64, Option<Trouble>) {
     let mut reader = Reader::new(alignment(), CHANNELS, 0);
     reader.start(0);
@@ -61,7 +63,7 @@ fn read(hardware: &mut Hardware, blocks: u32, mut late: impl FnMut(u32) -> u64) 
 
 #[test]
 fn blocks_that_are_looked_at_at_any_time_are_proven() {
-    // anywhere in a period, and up to six blocks late: seven are safe from being overwritten
+    // anywhere in a period, and up to six blocks late: seven blocks are safe from being overwritten
     for late in (0..6 * BLOCK_SCANS as u64 * PERIOD).step_by(1_237) {
         let mut hardware = Hardware::new(true, None);
         let late_once = |number: u32| if number == 3 { late } else { 0 };
@@ -99,7 +101,7 @@ fn every_slip_is_found_in_its_own_block_however_late_the_program_is() {
                         Slip::WordLost => 1,
                     };
                     let due = if chip == 0 { Trouble::Slipped(words, 0) } else { Trouble::Slipped(0, words) };
-                    // nothing of its block, and nothing after it, was delivered
+                    // nothing of its block and nothing after it was delivered
                     assert_eq!((scans, trouble), (45, Some(due)), "{slip:?} of {chip} at {at}, {late} late");
                 }
             }
@@ -115,7 +117,8 @@ fn without_a_restart_the_ports_read_once_and_never_again() {
 
 #[test]
 fn counts_may_wrap() {
-    // after a day the count of periods comes round; blocks are a power of two in the ring, so the count of blocks may
+    // the count of periods wraps after a day; the ring has a power of two of blocks, so the count
+    // of blocks may wrap
     let number = u32::MAX - 2;
     let begin = number.wrapping_mul(BLOCK_SCANS as u32);
     let words =

@@ -1,16 +1,16 @@
-//! Noise by range, and what aliases into the band: docs/front-end.md has the same tables.
+//! Noise per range, and aliasing into the band: docs/front-end.md contains the same tables.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// A force cell, V/N (`channels.rs` of the nucleo: 44.643 N/V).
+/// Sensitivity of a force cell, V/N (`channels.rs` of the nucleo: 44.643 N/V).
 const FORCE_V_PER_N: f64 = 1.0 / 44.643;
-/// The hammer's peak, N.
+/// Peak force of the hammer, N.
 const PEAK_N: f64 = 50.0;
-/// Codes of 16 bits.
+/// Number of 16-bit codes.
 const CODES: f64 = 65_536.0;
 
-/// Part, range in V, and typical signal to noise at full scale in dB without averaging: from memory of AD7606B Rev. 0 and AD7606C-16 Rev. 0, "Specifications",
-/// not checked against them.
+/// Part, range in V, and typical signal-to-noise ratio at full scale in dB without averaging: from
+/// memory of AD7606B Rev. 0 and AD7606C-16 Rev. 0, "Specifications", not checked against them.
 const CONVERTERS: [(&str, f64, f64); 6] = [
     ("AD7606B", 10.0, 90.0),
     ("AD7606B", 5.0, 89.0),
@@ -20,7 +20,8 @@ const CONVERTERS: [(&str, f64, f64); 6] = [
     ("AD7606C-16", 2.5, 88.0),
 ];
 
-/// Sensors, and the noise of their own in codes of ± 10 V (`hil-sim/rigs/default.toml`, over the whole band).
+/// Sensors and their own noise in codes of ± 10 V (`hil-sim/rigs/default.toml`, over the whole
+/// band).
 const SENSORS: [(&str, f64); 4] = [
     ("hammer's force cell", 0.7),
     ("load cell", 1.6),
@@ -32,7 +33,7 @@ fn decibels(ratio: f64) -> f64 {
     20.0 * ratio.log10()
 }
 
-/// Noise of a converter, V rms; its quantisation is a part of it.
+/// Noise of a converter, V rms, including its quantisation.
 fn noise_v(range_v: f64, snr_db: f64) -> f64 {
     range_v * FRAC_1_SQRT_2 / 10_f64.powf(snr_db / 20.0)
 }
@@ -41,24 +42,24 @@ fn quantisation_v(range_v: f64) -> f64 {
     2.0 * range_v / CODES / 12_f64.sqrt()
 }
 
-/// A Butterworth low-pass, as a ratio.
+/// Gain of a Butterworth low-pass.
 fn low_pass(frequency_hz: f64, corner_hz: f64, order: i32) -> f64 {
     (1.0 + (frequency_hz / corner_hz).powi(2 * order)).sqrt().recip()
 }
 
-/// The mean of `count` conversions, 1.25 µs apart.
+/// Gain of the mean of `count` conversions, 1.25 µs apart.
 fn mean_of(frequency_hz: f64, count: f64) -> f64 {
     let half = PI * frequency_hz * 1.25e-6;
     ((count * half).sin() / (count * half.sin())).abs()
 }
 
-/// The half-band filter of `jointrig_hot::half_band`, at 102.4 kHz.
+/// Gain of the half-band filter of `jointrig_hot::half_band`, at 102.4 kHz.
 fn half_band(frequency_hz: f64) -> f64 {
     let (s, c) = (PI * frequency_hz / 102_400.0).sin_cos();
     c.powi(6) * (1.0 + 3.0 * s.powi(2) + 6.0 * s.powi(4))
 }
 
-/// The chip's own filter at ± 10 V, and 1 kΩ with 1 nF.
+/// Gain of the chip's own filter at ± 10 V with 1 kΩ and 1 nF before it.
 fn analogue(frequency_hz: f64) -> f64 {
     low_pass(frequency_hz, 23_000.0, 2) * low_pass(frequency_hz, 159_155.0, 1)
 }
@@ -106,7 +107,7 @@ fn the_page_shows_what_a_smaller_range_brings_each_sensor() {
 #[test]
 fn the_page_shows_what_aliases() {
     let page = page();
-    // what comes out at 5 kHz
+    // the frequency that aliases to 5 kHz
     let at = 46_200.0;
     let now = analogue(at) * mean_of(at, 8.0);
     let twice = analogue(at) * mean_of(at, 4.0);

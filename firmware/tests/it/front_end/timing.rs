@@ -1,18 +1,21 @@
-//! A bit's way from the converter to the port, and whether it comes in time: docs/WIRING.md has the same table.
+//! Timing of a bit from the converter to the port, and its margin: docs/WIRING.md contains the same
+//! table.
 
-/// SCLK's period, ns: 160 MHz / 4.
+/// SCLK period, ns: 160 MHz / 4.
 const PERIOD: f64 = 25.0;
-/// From SCLK's rising edge at the converter to valid data, ns (AD7606B Rev. 0, "Timing Specifications", serial interface, VDRIVE above 2.7 V).
+/// From SCLK's rising edge at the converter to valid data, ns (AD7606B Rev. 0, "Timing
+/// Specifications", serial interface, VDRIVE above 2.7 V).
 const CONVERTER: f64 = 15.0;
 /// Along 100 mm of trace or ribbon and back, ns: 6.7 ps/mm each way in FR4.
 const TRACE: f64 = 2.0 * 100.0 * 6.7e-3;
-/// Of data before the edge that takes them, ns: an upper bound of this table, to be compared with the controller's datasheet
-/// ("SPI characteristics", data input setup time in master mode) before the board is ordered.
+/// Data setup time before the sampling edge, ns: the upper limit for this table, to be compared
+/// with the controller's data sheet ("SPI characteristics", data input setup time in master mode)
+/// before the board is ordered.
 const SETUP: f64 = 4.0;
-/// An isolator in both ways, ns: a digital one of the fast kind takes some 10 in each.
+/// An isolator in both directions, ns: a fast digital isolator has about 10 ns in each.
 const ISOLATOR: f64 = 2.0 * 10.0;
 
-/// What is left, ns, when data are taken so long after the edge that puts them out.
+/// Timing margin, ns, when data are sampled `after` ns after the edge that outputs them.
 fn left(after: f64, isolator: f64) -> f64 {
     after - CONVERTER - TRACE - SETUP - isolator
 }

@@ -1,4 +1,4 @@
-//! The bus and the device's controller: what a USB peripheral does, without one.
+//! The bus and the device's controller: the behaviour of a USB peripheral, simulated.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -14,7 +14,7 @@ use embassy_usb_driver::{
 
 use jointrig_firmware::usb::mended::Registers;
 
-/// One endpoint of one direction: a FIFO of one packet, as the hardware has.
+/// One endpoint in one direction: a FIFO of one packet, as in the hardware.
 #[derive(Default)]
 pub struct End {
     pub info: Option<EndpointInfo>,
@@ -23,7 +23,7 @@ pub struct End {
     pub packet: Option<Vec<u8>>,
 }
 
-/// A control transfer under way.
+/// A control transfer in progress.
 #[derive(Default)]
 pub struct Control {
     pub setup: Option<[u8; 8]>,
@@ -33,7 +33,7 @@ pub struct Control {
     pub status: Option<bool>,
 }
 
-/// What is done to the registers around the driver.
+/// Register accesses of the driver's workarounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mend {
     SuspendForgotten,
@@ -75,7 +75,7 @@ impl Wires {
     }
 }
 
-/// Shared by both sides; whoever changes something wakes everybody.
+/// Shared by both sides; every change wakes all waiting tasks.
 #[derive(Clone, Default)]
 pub struct Bus(Rc<RefCell<Wires>>);
 
@@ -105,7 +105,7 @@ impl Bus {
     }
 }
 
-/// The device's end of the bus, as embassy's driver traits want it.
+/// The device's end of the bus, implementing embassy's driver traits.
 pub struct Device(pub Bus);
 pub struct DeviceBus(Bus);
 pub struct DeviceControl(Bus, u16);

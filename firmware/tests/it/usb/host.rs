@@ -4,7 +4,7 @@ use embassy_usb_driver::{EndpointAddress, Event};
 
 use crate::usb::bus::Bus;
 
-/// The device answered with a stall.
+/// The device responded with a stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stall;
 
@@ -19,7 +19,7 @@ pub struct Interface {
     pub into: u8,
 }
 
-/// What enumeration found.
+/// Result of an enumeration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
     pub device: Vec<u8>,
@@ -88,7 +88,7 @@ impl Host {
         String::from_utf16(&units).unwrap()
     }
 
-    /// Plugs the cable in, if it is not, and does what a host does then.
+    /// Plugs the cable in if necessary, and enumerates like a host.
     pub async fn enumerate(&self) -> Found {
         if !self.0.with(|wires| wires.powered) {
             self.0.with(|wires| wires.events.push_back(Event::PowerDetected));
@@ -107,11 +107,11 @@ impl Host {
         Found { device, configuration, interfaces, endpoints }
     }
 
-    /// A bus reset, as after an error or when a program asks for one.
+    /// A bus reset, as after an error or on request of a program.
     pub async fn reset(&self) {
         self.0.with(|wires| {
             wires.address = 0;
-            // what has come waits in the driver; what was to go is gone
+            // received packets remain in the driver; packets to be sent are lost
             wires.ends().for_each(|end| end.enabled = false);
             wires.into.iter_mut().for_each(|end| end.packet = None);
             wires.events.push_back(Event::Reset);
@@ -119,12 +119,12 @@ impl Host {
         self.0.until(|wires| wires.events.is_empty().then_some(())).await;
     }
 
-    /// Lets the bus sleep.
+    /// Suspends the bus.
     pub async fn suspend(&self) {
         self.tell_of(Event::Suspend).await;
     }
 
-    /// Wakes the bus.
+    /// Resumes the bus.
     pub async fn resume(&self) {
         self.tell_of(Event::Resume).await;
     }
@@ -134,13 +134,13 @@ impl Host {
         self.0.until(|wires| wires.events.is_empty().then_some(())).await;
     }
 
-    /// Pulls the cable.
+    /// Unplugs the cable.
     pub async fn unplug(&self) {
         self.0.with(|wires| wires.events.push_back(Event::PowerRemoved));
         self.0.until(|wires| (!wires.powered).then_some(())).await;
     }
 
-    /// Sends one packet; waits while the device has not taken the one before.
+    /// Sends one packet; waits until the device has taken the previous one.
     pub async fn put(&self, endpoint: u8, bytes: &[u8]) -> Result<(), Stall> {
         let address = EndpointAddress::from(endpoint);
         self.0
@@ -158,7 +158,7 @@ impl Host {
             .await
     }
 
-    /// Takes one packet; waits while there is none.
+    /// Receives one packet; waits until there is one.
     pub async fn take(&self, endpoint: u8) -> Result<Vec<u8>, Stall> {
         let address = EndpointAddress::from(endpoint);
         self.0

@@ -1,4 +1,4 @@
-//! The device's USB code, with the host in the same process.
+//! Tests of the device's USB code, with the host in the same process.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod bus;
@@ -21,10 +21,11 @@ use bus::{Bus, Device, Mend};
 use embassy_usb_driver::{EndpointAddress, Event};
 use host::{Host, Interface, Stall};
 
-/// What the device has heard: bytes, or `None` where its source reported a cut.
+/// Data received by the device: bytes, or `None` where its source reported a cut.
 type Heard = RefCell<Vec<Option<Vec<u8>>>>;
 
-/// Runs `scenario` on the host's side while the device hears, and sends `frames` one after another.
+/// Runs `scenario` on the host's side while the device receives, and sends `frames` one after
+/// another.
 fn run<F: Future<Output = ()>>(
     speed: Speed,
     frames: &[Vec<u8>],
@@ -56,7 +57,7 @@ fn run<F: Future<Output = ()>>(
     assert!(matches!(ended, Either::Second(())), "the device ended by itself");
 }
 
-/// What can be seen of the device from its own side.
+/// Data observed on the device's side.
 #[derive(Default)]
 struct Seen {
     heard: Heard,
@@ -73,7 +74,7 @@ impl Seen {
     }
 }
 
-/// Lets the device do all it can do without the host.
+/// Lets the device proceed as far as it can without the host.
 async fn settle() {
     for _ in 0..50 {
         yield_now().await;
@@ -125,7 +126,7 @@ fn windows_is_told_to_use_winusb_for_the_vendor_interface_alone() {
     run(Speed::High, &[], async |host, _| {
         host.enumerate().await;
         let bos = host.ask(0, 6, 0x0F00, 0, 255).await.unwrap();
-        // the platform capability of Microsoft OS 2.0 descriptors, and how to ask for them
+        // the platform capability of Microsoft OS 2.0 descriptors, and the request for them
         let uuid =
             [0xDF, 0x60, 0xDD, 0xD8, 0x89, 0x45, 0xC7, 0x4C, 0x9C, 0xD2, 0x65, 0x9D, 0x9E, 0x64, 0x8A, 0x9F];
         let at = bos.windows(16).position(|window| window == uuid).unwrap();
@@ -136,7 +137,7 @@ fn windows_is_told_to_use_winusb_for_the_vendor_interface_alone() {
         let compatible = set.windows(6).position(|window| window == b"WINUSB").unwrap();
         let guid: Vec<u8> = INTERFACE_GUID.encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert!(set.windows(guid.len()).any(|window| window == guid));
-        // the function subset before it begins at interface 0, which is the vendor's
+        // the preceding function subset begins at interface 0, which is the vendor interface
         let subset = set[..compatible].windows(4).rposition(|window| window == [8, 0, 2, 0]).unwrap();
         assert_eq!(set[subset + 4], 0);
     });
@@ -163,7 +164,7 @@ fn the_serial_port_takes_what_serial_ports_are_told() {
     });
 }
 
-/// All frame kinds there and back, unchanged, on one way.
+/// Sends all frame kinds both ways on one interface and expects them unchanged.
 fn golden_vectors_cross(speed: Speed, way: fn(&host::Found) -> Interface) {
     let frames = golden_frames();
     assert_eq!(frames.len(), golden::COMMITTED.len());
@@ -242,10 +243,10 @@ fn a_stalled_reader_makes_the_sink_wait_and_loses_nothing() {
         host.put(way.out, b"hello").await.unwrap();
         for (i, frame) in numbered(40).into_iter().enumerate() {
             settle().await;
-            // one packet in the FIFO is all that gets ahead of the host
+            // at most one packet, in the FIFO, is ahead of the host
             let ahead = seen.written.get() - i;
             assert!(ahead <= 1, "{ahead} frames ahead");
-            // requests get through meanwhile
+            // requests are still received meanwhile
             host.put(way.out, b"!").await.unwrap();
             assert_eq!(host.take(way.into).await.unwrap(), frame);
         }
@@ -317,7 +318,7 @@ fn a_host_that_changes_over_is_followed() {
         host.put(vendor.out, b"half").await.unwrap();
         host.take(vendor.into).await.unwrap();
         settle().await;
-        // the vendor's FIFO is full again and nobody will ever empty it
+        // the vendor's FIFO is full again and will never be emptied
         host.put(serial_port.out, b"hello").await.unwrap();
         let next = host.take(serial_port.into).await.unwrap();
         assert!(numbered(8)[2..].contains(&next));
@@ -357,7 +358,7 @@ fn a_small_buffer_gets_a_packet_in_parts() {
                 got.extend_from_slice(&bytes[..length]);
             }
         };
-        // as on a board, the device looks before a host can have sent
+        // as on a board, the device starts reading before a host can have sent
         join(reading, sending).await;
     };
     block_on(select(usb.device.run(), pin!(test)));
@@ -368,7 +369,7 @@ fn a_small_buffer_gets_a_packet_in_parts() {
 fn a_suspended_bus_is_a_cut_link() {
     run(Speed::High, &[], async |host, seen| {
         let vendor = host.enumerate().await.vendor();
-        // before anybody has spoken there is nothing to cut
+        // before the first transfer there is no link to cut
         host.suspend().await;
         host.resume().await;
         host.put(vendor.out, &[1, 2, 3]).await.unwrap();
@@ -390,7 +391,8 @@ fn a_packet_from_before_a_reset_is_no_order_after_it() {
         let way = host.enumerate().await.vendor();
         host.put(way.out, b"first").await.unwrap();
         settle().await;
-        // it arrives together with the reset, and waits in the driver until the endpoint is enabled again
+        // it arrives together with the reset, and waits in the driver until the endpoint is enabled
+        // again
         host.put(way.out, b"stale").await.unwrap();
         host.reset().await;
         let way = host.enumerate().await.vendor();
@@ -419,7 +421,7 @@ fn toggles_begin_anew_and_an_old_suspend_is_forgotten() {
         assert_eq!(mends(&host), [], "a halt alone");
         host.tell(0x02, 1, 0, u16::from(way.into), &[]).await.unwrap();
         assert_eq!(mends(&host), [Mend::Data0(ends[1])]);
-        // a suspend that was latched before a reset, and is told with it: the link goes on
+        // a suspend latched before a reset and reported with it: the link continues
         host.put(way.out, b"a").await.unwrap();
         settle().await;
         host.0.with(|wires| wires.events.extend([Event::Reset, Event::Suspend]));

@@ -1,8 +1,9 @@
-//! The benchmark: instructions of the real tasks, served from inside the image by a script.
+//! The benchmark: instruction counts of the real tasks, driven by a script inside the image.
 //!
-//! The same tasks over the same parts run as under the simulator; only [`serve`] stands in for it. What the
-//! script itself does between two turns is not counted. Sixteen channels of small noise around zero flow,
-//! whose high bytes are mostly 0 or 255: a hard case for COBS, and the usual one at rest.
+//! The same tasks with the same parts run as with the simulator; only [`serve`] replaces it.
+//! Instructions of the script itself between two turns are not counted. The data are sixteen
+//! channels of small noise around zero, whose high bytes are mostly 0 or 255: a demanding case for
+//! COBS, and the usual one at rest.
 
 use core::cell::RefCell;
 use core::hint::black_box;
@@ -32,14 +33,14 @@ use crate::script::{RATE_HZ, Step, VENDOR, step, text};
 use crate::{counter, stack};
 
 const PER_BLOCK: u64 = 15;
-/// A host acknowledges every so many blocks.
+/// The host acknowledges after this many blocks.
 const ACKNOWLEDGE_EVERY: u32 = 8;
-/// Different blocks of noise.
+/// Number of different noise blocks.
 const NOISES: usize = 16;
 /// The force channel's code during contact: well above any trigger.
 const HIT: i16 = 8_000;
 
-/// What one figure counts.
+/// Name and value of one figure.
 type Figure = (&'static str, u64);
 
 struct Bench {
@@ -52,7 +53,7 @@ struct Bench {
     worst_block: u64,
     released: u32,
     reply: Reply,
-    /// Blocks as the two converters send them.
+    /// Blocks as sent by the two converters.
     chips: [[[u8; CHIP_BYTES]; 2 * PER_BLOCK as usize]; NOISES],
     figures: Vec<Figure, 48>,
     writer: Writer,
@@ -83,7 +84,7 @@ static BENCH: Mutex<CriticalSectionRawMutex, RefCell<Bench>> = Mutex::new(RefCel
     writer: Writer::new(Kind::Hello),
 }));
 
-/// Runs the benchmark, prints its figures and ends.
+/// Runs the benchmark, prints its figures and exits.
 pub fn run() -> ! {
     counter::start();
     BENCH.lock(|bench| bench.borrow_mut().prepare());
@@ -102,7 +103,7 @@ fn serve(ask: &Ask) -> Reply {
 }
 
 impl Bench {
-    /// Makes the noise and counts what needs no tasks.
+    /// Generates the noise and measures what needs no tasks.
     fn prepare(&mut self) {
         let mut state = 12_345_u32;
         let mut uniform = || {
@@ -147,7 +148,7 @@ impl Bench {
     }
 
     fn count(&mut self, name: &'static str, mut work: impl FnMut()) {
-        // the second time, so that nothing is done for the first time
+        // the second run counts, so that one-time work is excluded
         let mut spent = 0;
         for _ in 0..2 {
             let before = counter::ticks();
@@ -183,7 +184,8 @@ impl Bench {
         self.reply
     }
 
-    /// From a block's delivery to the coil's order; the first of each is the one meant.
+    /// Notes the instructions from a block's delivery to the coil order; only the first of each
+    /// counts.
     fn note_coil(&mut self, name: &'static str) {
         if self.figures.iter().all(|(known, _)| *known != name) {
             self.note(name, counter::instructions(self.since_block));
@@ -212,7 +214,7 @@ impl Bench {
             }
             Step::Ask(_, mut request) => {
                 if let Request::Resend { epoch, .. } = &mut request {
-                    // the first stream of boot 1
+                    // epoch of the first stream of boot 1
                     *epoch = 1 << 16;
                 }
                 self.request += 1;
@@ -228,7 +230,7 @@ impl Bench {
             Step::Contact(_) => {
                 self.left = 1;
                 self.stream(ask);
-                // every fourth scan from the third on shows force
+                // every fourth scan from the third on contains force
                 let hit = sent(&[HIT, 0, 0, 0, 0, 0, 0, 0]);
                 for scan in (2..PER_BLOCK as usize).step_by(4) {
                     memory::write(BLOCK_AT + DELIVERY_BYTES + scan * CHIP_BYTES, &hit);
@@ -242,7 +244,7 @@ impl Bench {
         }
     }
 
-    /// Notes what the step that has just ended took.
+    /// Notes the result of the step that has just ended.
     fn finish(&mut self) {
         let spent = self.spent;
         match step(self.step - 1) {
@@ -261,7 +263,7 @@ impl Bench {
         }
     }
 
-    /// Lets time go on: to the next alarm, or to the next block.
+    /// Advances the time to the next alarm or the next block.
     fn stream(&mut self, ask: &Ask) {
         if ask.alarm_us < ask.block_us {
             self.reply.now_us = ask.alarm_us;
@@ -279,7 +281,7 @@ impl Bench {
         memory::write(BLOCK_AT, &delivery.to_bytes());
         self.reply.blocks = self.blocks;
         if self.blocks.is_multiple_of(ACKNOWLEDGE_EVERY) {
-            // the first stream of boot 1, the second, the third
+            // epochs of the first, second and third stream of boot 1
             let stream = u32::from(self.step > 25) + u32::from(self.step > 33);
             let epoch = (1 << 16) + stream;
             let next_scan = u64::from(self.blocks - 1) * PER_BLOCK;
@@ -306,7 +308,7 @@ impl Bench {
     }
 }
 
-/// A scan of one converter, as it sends it.
+/// A scan of one converter, as it is sent.
 fn sent(codes: &[i16; CHANNELS]) -> [u8; CHIP_BYTES] {
     let mut bytes = [0; CHIP_BYTES];
     let words = codes.iter().copied().chain([data_crc(codes).cast_signed()]);
@@ -316,7 +318,7 @@ fn sent(codes: &[i16; CHANNELS]) -> [u8; CHIP_BYTES] {
     bytes
 }
 
-/// Sixteen channels with all roles that cost something.
+/// Sixteen channels, with all roles that affect the processing time.
 fn set_up() -> Setup {
     let channel = |index: usize| Channel {
         name: text("channel"),

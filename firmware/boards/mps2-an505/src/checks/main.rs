@@ -1,9 +1,8 @@
-//! What is asked of the board by those who make it. The image's first argument chooses:
+//! Checks of the board for its developers. The image's first argument selects one:
 //!
-//! | argument | what |
-//! |---|---|
-//! | `golden` | compares all golden vectors of the wire with this build's frames, and copies of memory with their originals |
-//! | `bench` | counts instructions; QEMU must run with `-icount shift=10,sleep=off` |
+//! - `golden` compares all golden vectors of the protocol with this build's frames, and checks
+//!   copies of memory against their originals.
+//! - `bench` counts instructions; QEMU must run with `-icount shift=10,sleep=off`.
 #![no_std]
 #![no_main]
 
@@ -21,7 +20,7 @@ use semihosting::{eprintln, println, process};
 #[cortex_m_rt::entry]
 fn main() -> ! {
     jointrig_board_fault::limit_stack();
-    // a command line that cannot be read is treated as none
+    // an unreadable command line is treated as empty
     let words = args::<256>().ok();
     match words.as_ref().into_iter().flatten().next() {
         Some(Ok("golden")) => vectors(),

@@ -1,4 +1,4 @@
-//! The benchmark's script: what a host asks and the rig shows, in order.
+//! The benchmark's script: the host's requests and the rig's data, in order.
 
 use heapless::Vec;
 use jointrig_protocol::channel::Name;
@@ -12,11 +12,11 @@ pub const RATE_HZ: u32 = 51_200;
 pub enum Step {
     /// The handshake, with this session.
     Greet(u32),
-    /// One request.
+    /// One request, with the name of its figure.
     Ask(&'static str, Request),
     /// Blocks of noise; the figure is per scan.
     Stream(&'static str, u32),
-    /// One block whose force channel shows contact.
+    /// One block with contact in its force channel.
     Contact(&'static str),
     /// One block with the guard open.
     Guard(&'static str),
@@ -30,7 +30,7 @@ pub fn step(number: usize) -> Option<Step> {
     let fire = |number, watched: usize| {
         let mut quiet_limits = Vec::new();
         for channel in 0..MAX_CHANNELS {
-            // far below the noise's own motion, so that the structure is never quiet
+            // far below the noise, so that the structure is never quiet
             let _ = quiet_limits.push(if (1..=watched).contains(&channel) { 1e-12 } else { 0.0 });
         }
         let quiet_window = if watched == 0 { 0 } else { 256 };
@@ -77,7 +77,7 @@ pub fn step(number: usize) -> Option<Step> {
         13 => Step::Ask("shake", Request::Shake(shake)),
         14 => Step::Stream("scan.shaking", 1_024),
         15 => Step::Ask("rest", Request::Rest),
-        // the ramp down, and the noise of the blocks after it
+        // the ramp down, and noise blocks after it
         16 => Step::Stream("", 256),
         17 | 27 => Step::Ask("", arm),
         18 => Step::Ask("", fire(2, 0)),
@@ -92,7 +92,7 @@ pub fn step(number: usize) -> Option<Step> {
         28 => Step::Ask("", fire(3, 0)),
         30 => Step::Guard("block.guard"),
         31 => Step::Ask("emergency_stop", Request::EmergencyStop),
-        // the same over a stream of bytes
+        // the same over a byte stream
         32 => Step::Greet(VENDOR + 1),
         34 => Step::Stream("scan.stuffed", 1_024),
         _ => return None,

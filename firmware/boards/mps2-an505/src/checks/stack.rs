@@ -1,4 +1,5 @@
-//! The stack's high-water mark: the start-up code paints the stack, and what lost its paint was used.
+//! Peak stack usage: the start-up code fills the stack with a pattern, and words that lost it were
+//! used.
 
 use core::ptr;
 
@@ -11,11 +12,12 @@ unsafe extern "C" {
     static _stack_start: u32;
 }
 
-/// Bytes of stack that were ever used.
+/// Bytes of stack used so far, at most.
 pub fn high_water() -> usize {
     let (mut word, top) = (&raw const _stack_end, &raw const _stack_start);
-    // SAFETY: between the two lies the stack's memory and nothing else; it is read word by word, volatile,
-    // and never beyond its top. What is in use is above this function's own frame, where the scan ends.
+    // SAFETY: only the stack's memory lies between the two symbols; it is read word by word with
+    // volatile reads, never beyond its top. The part in use is above this function's own frame,
+    // where the scan ends.
     unsafe {
         while word < top && ptr::read_volatile(word) == STACK_PAINT_VALUE {
             word = word.add(1);
