@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 #[cfg(feature = "sim")]
 #[expect(dead_code, reason = "the rest is for the tables of the tests")]
-#[path = "../tests/simulated/mod.rs"]
+#[path = "../tests/it/simulated/mod.rs"]
 mod simulated;
 
 fn main() {

@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// The programs that take longest, by package and target, the longest first. They start first, so
 /// that none of them runs alone at the end.
-const LONGEST: [(&str, &str); 3] =
-    [("jointrig-tests", "it"), ("jointrig", "it"), ("jointrig-tests", "qemu")];
+const LONGEST: [(&str, &str); 3] = [("jointrig-tests", "it"), ("jointrig", "it"), ("jointrig-tests", "qemu")];
 
 /// One test program.
 #[derive(Debug, PartialEq, Eq)]

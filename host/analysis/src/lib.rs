@@ -47,5 +47,4 @@ mod parallel;
 pub mod spectra;
 pub mod structure;
 pub mod substructuring;
-mod transforms;
 mod vectors;

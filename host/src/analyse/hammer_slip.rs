@@ -3,7 +3,7 @@
 
 use super::cell::{CellName, Hit};
 use crate::hysteresis::hammer_slip::{CellHits, HammerSlip};
-use crate::hysteresis::hit_response::{HitResponse, HitSignals};
+use crate::hysteresis::hammer_slip::{HitResponse, HitSignals};
 
 /// The response per newton of one hit that moves the contact.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,12 +2,12 @@
 
 use super::cell::{ContactDelays, ContactSignals};
 use super::checks::HiddenResonance;
-use crate::hysteresis::first_cycle::{DECAY_CYCLES, FirstCycle};
+use crate::hysteresis::cycles::open_record;
 use crate::hysteresis::impact::DecayCycle;
-use crate::hysteresis::integration::open_record;
-use crate::hysteresis::reconstruction::decaying;
+use crate::hysteresis::impact::{DECAY_CYCLES, FirstCycle};
+use crate::hysteresis::phase_split::decaying;
 use crate::hysteresis::static_arm::Identified;
-use crate::hysteresis::{HysteresisError, OverCycles, Shape, delays};
+use crate::hysteresis::{HysteresisError, OverCycles, Shape, record};
 use crate::results::{DecayStep, ImpactSlope, LoopCurve, Reconstruction, rounded};
 
 /// If a straight line explains less of T than this, the loop is not clean.

@@ -7,7 +7,7 @@ use super::contact_answer::{cells, input};
 use crate::contact::{
     ContactError, Joint, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, joint, level_stiffness,
 };
-use crate::hysteresis::tones::Tones;
+use crate::hysteresis::static_arm::Tones;
 use crate::hysteresis::{LoopAnalysis, LoopFinding, Shape};
 
 /// Number of stretches of a record whose scatter gives its noise: enough to determine a standard

@@ -229,7 +229,7 @@ impl Measurements for Rig {
                 let contact = (coupled && along_z).then(|| {
                     let [a, b] = [0, 1].map(|body| scaled(&unit.velocity[body]));
                     // the load cells measure the force in B's spring
-                    let x_b = crate::hysteresis::integration::open_record(&b, 0.0, 1.0 / FS_HZ);
+                    let x_b = crate::hysteresis::cycles::open_record(&b, 0.0, 1.0 / FS_HZ);
                     let tangential_n = x_b.iter().map(|x| 150e6 * x).collect();
                     ContactSignals {
                         specimen_a_m_per_s: a,

@@ -7,9 +7,9 @@ use super::missing::Missing;
 use crate::campaign::plan::level::Moment;
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
-use crate::hysteresis::integration::open_record;
+use crate::hysteresis::cycles::open_record;
 use crate::hysteresis::static_arm::Identified;
-use crate::hysteresis::tones::Tones;
+use crate::hysteresis::static_arm::Tones;
 use crate::hysteresis::{
     HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_both, analyse_corrected,
 };

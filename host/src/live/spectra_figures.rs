@@ -5,7 +5,7 @@ use crate::campaign::plan::{Cell as PlanCell, Plan};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
-use crate::spectra::{CrossSpectra, usable_band};
+use crate::spectra::{CrossSpectra, estimate};
 
 /// Lines averaged into one value of the force spectrum, as for the usable bands of the report, so
 /// that noise of single lines does not end a band.

@@ -7,7 +7,7 @@ use crate::campaign::store::record_row::Samples;
 use crate::device::channels::ChannelMap;
 use crate::device::recording::by_channel;
 use crate::hysteresis::RelativeMotion;
-use crate::hysteresis::integration::closed_cycle;
+use crate::hysteresis::cycles::closed_cycle;
 
 /// Most points of a loop on the screen.
 const POINTS: usize = 180;

@@ -6,7 +6,7 @@
 #![cfg(feature = "sim")]
 
 use jointrig::hysteresis::hammer_slip::{CellHits, HammerSlip, Unclear};
-use jointrig::hysteresis::hit_response::{HitResponse, HitSignals};
+use jointrig::hysteresis::hammer_slip::{HitResponse, HitSignals};
 use jointrig_hil_sim::rig::config::ContactLaw;
 use jointrig_hil_sim::rig::{Configuration, Mishap, Rig, RigConfig};
 use rand::{RngExt, SeedableRng};

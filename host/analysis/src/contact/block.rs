@@ -1,8 +1,8 @@
 //! The cells of one impact: rows, frequency lines and the parameters that they depend on.
 
 use super::cell::{self, CHANNELS, ContactCell, Values};
+use super::parameters::Cause;
 use super::parameters::{DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
-use super::priors::Cause;
 use super::{ContactError, Input};
 use crate::structure::Structure;
 use crate::substructuring::geometry::Grouping;

@@ -32,15 +32,10 @@
 //! - `levels`: k_T of the shaker's levels, given the result of the hits; `driven`: the rotation of
 //!   the bodies there; `joint`: the average of both
 
-mod bins;
 mod block;
-mod budget;
 mod cell;
-mod covariance;
 mod diagnosis;
 mod driven;
-mod form_scale;
-mod interval;
 mod joint;
 mod levels;
 #[cfg(test)]
@@ -49,31 +44,27 @@ mod line;
 mod model;
 mod outcome;
 mod parameters;
-mod priors;
-mod reading;
 mod solver;
 #[cfg(test)]
 mod tests;
-mod trusted_band;
-mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, Left};
-pub use interval::Interval;
 pub use joint::{Joint, joint};
 pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};
+pub use outcome::Interval;
 pub use outcome::{OfFrequency, Stiffness};
-pub use priors::{Cause, ContactPriors};
+pub use parameters::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
 use block::{Block, blocks};
-use budget::{Variances, of_sum};
-use covariance::Certainty;
+use diagnosis::trusted;
 use nalgebra::DVector;
+use outcome::{Variances, of_sum};
 use parameters::Parameters;
+use solver::Certainty;
 use solver::Solution;
-use trusted_band::trusted;
 
 /// The band in which the contact is evaluated, Hz: above the drift of hammer and windows, below the
 /// first bending modes of the paper's arms and specimens. If others bend at lower frequencies, the
@@ -237,7 +228,7 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
             "only {lines} lines of the hits on the assembly are numbers with a known noise in every cell"
         )));
     }
-    form_scale::scale_form(&mut parameters, &blocks);
+    parameters::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })

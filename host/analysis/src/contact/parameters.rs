@@ -1,7 +1,15 @@
 //! The unknowns of the fit: the contact, the form that gives its force, and all rig quantities that
 //! are not known exactly, each with its prior.
+//!
+//! Prior standard deviations of positions, angles, gains and delays.
+//!
+//! Expected size of the coefficients of the force's form, from the stiffness that the load cells
+//! show.
 
-use super::priors::{Cause, ContactPriors};
+use super::block::{Block, Group};
+use crate::substructuring::averaged::Priors as Positions;
+use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// 1/k_T, m/N.
 pub const COMPLIANCE: usize = 0;
@@ -147,5 +155,112 @@ pub fn along_z(impact: &str, direction: [f64; 3], tilt_rad: f64) -> Parameter {
         sigma: (tilt_rad * across).hypot(second),
         cause: Cause::HammerTilt,
         tilted: Some([z, tilt_rad]),
+    }
+}
+
+/// Standard deviations of quantities that are not known exactly. They belong to the experiment, and
+/// k_T's interval depends on them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ContactPriors {
+    /// Sensors and hits on the arms: position, aim and the hammer's tilt.
+    #[serde(flatten)]
+    pub positions: Positions,
+    /// Position of a vibrometer spot relative to the contact, m along each axis.
+    pub spot_m: f64,
+    /// Position of a point of the 3-D vibrometer on a specimen, m along each axis.
+    pub specimen_point_m: f64,
+    /// Gain of each vibrometer and axis, relative.
+    pub gain: f64,
+    /// Gain of the hammer's force cell, relative: k_T is proportional to it.
+    pub hammer_gain: f64,
+    /// Delay of each vibrometer and axis relative to the hammer, beyond what the device reports, s.
+    pub skew_s: f64,
+}
+
+impl Default for ContactPriors {
+    /// Spots placed to 0.05 mm, points on specimens to 0.3 mm, gains calibrated to 0.5 %, delays
+    /// known to 2 µs.
+    fn default() -> Self {
+        ContactPriors {
+            positions: Positions::default(),
+            spot_m: 5e-5,
+            specimen_point_m: 3e-4,
+            gain: 5e-3,
+            hammer_gain: 5e-3,
+            skew_s: 2e-6,
+        }
+    }
+}
+
+/// Source of an estimate's uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// Noise of the signals.
+    Noise,
+    /// Positions of the spots next to the contact.
+    Spots,
+    /// Positions of the points on the specimens.
+    SpecimenPoints,
+    /// Positions of the points on arm B.
+    ArmPoints,
+    /// Aim of hammer and vibrometer in each cell.
+    Aim,
+    /// The tilt of the hammer in the hits on B alone.
+    HammerTilt,
+    /// Gains of vibrometers, load cells and hammer.
+    Gains,
+    /// Delays between the channels.
+    Skew,
+    /// The model does not describe the signals down to their noise.
+    Misfit,
+}
+
+impl Cause {
+    /// Its name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Cause::Noise => "noise",
+            Cause::Spots => "spots",
+            Cause::SpecimenPoints => "specimen-points",
+            Cause::ArmPoints => "arm-points",
+            Cause::Aim => "aim",
+            Cause::HammerTilt => "hammer-tilt",
+            Cause::Gains => "gains",
+            Cause::Skew => "skew",
+            Cause::Misfit => "misfit",
+        }
+    }
+}
+
+/// Stiffness parallel to the load cells, relative to theirs, K = |T/z_B|.
+const BESIDE: f64 = 0.5;
+/// Damping over K, s.
+const DAMPING_S: f64 = 3e-5;
+/// Arm B's mass resonates on K above this frequency, Hz.
+const LOWEST_HZ: f64 = 250.0;
+
+/// Sets the priors of the form: for z_B these values, for rotations the same times the lever arm of
+/// arm B's points. They keep the form from fitting noise where the hits hardly determine it.
+pub fn scale_form(parameters: &mut Parameters, blocks: &[Block]) {
+    let mut stiffness: Vec<f64> = Vec::new();
+    let mut lever_m: f64 = 0.0;
+    let start = |at: usize| parameters.all()[at].start;
+    for block in blocks.iter().filter(|b| b.along_z.is_some_and(|at| start(at).abs() > 0.5)) {
+        let place = |channel| block.rows.iter().position(|row| row.cell == 0 && row.channel == channel);
+        if let (Some(t), Some(spot)) = (place(0), place(1)) {
+            stiffness.extend(block.lines.iter().map(|line| (line.value[t] / line.value[spot]).norm()));
+        }
+        for cell in block.cells.iter().filter(|cell| cell.group == Group::ArmB) {
+            lever_m = lever_m.max(start(cell.point).hypot(start(cell.point + 1)));
+        }
+    }
+    stiffness.sort_by(f64::total_cmp);
+    let Some(k) = stiffness.get(stiffness.len() / 2).copied() else { return };
+    let mass = k / (TAU * LOWEST_HZ).powi(2);
+    for (term, sigma) in [BESIDE * k, DAMPING_S * k, mass].into_iter().enumerate() {
+        for (of, lever) in [1.0, lever_m, lever_m].into_iter().enumerate() {
+            parameters.narrow(FORM + 2 + 3 * of + term, sigma * lever);
+        }
     }
 }

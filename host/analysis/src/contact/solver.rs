@@ -1,15 +1,19 @@
 //! The most likely parameters: Gauss–Newton steps on the posterior, with the motion eliminated at
 //! every line.
+//!
+//! Uncertainty of the parameters when the motion itself is known from noisy signals only.
+//!
+//! Sums over all lines of all blocks, by frequency bin.
 
-use super::ContactError;
-use super::bins::{Bin, Motion, evaluate, motions, summed};
 use super::block::Block;
-use super::covariance::{Certainty, REGULAR, certainty, scaled, units};
-use super::line::Residual;
+use super::line::{Normal, Residual};
 use super::parameters::{COMPLIANCE, Parameters};
-use super::unexplained;
+use super::{ContactError, diagnosis};
+use crate::errors_in_variables::Feigned;
 use crate::frf::noise::shared_by_lines;
+use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, DVector};
+use num_complex::Complex;
 
 /// Largest number of steps.
 const STEPS: usize = 60;
@@ -76,7 +80,7 @@ pub fn solve(
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
             .collect();
-        if !unexplained::widen(blocks, &left) {
+        if !diagnosis::widen(blocks, &left) {
             break;
         }
         (here, settled) = Posterior { blocks, parameters, shared }.settle(here.p)?;
@@ -198,4 +202,166 @@ fn newton(
     one[COMPLIANCE] = unit[COMPLIANCE];
     let variance = 0.5 * factors.solve(&one)[COMPLIANCE] * unit[COMPLIANCE];
     Ok((step, variance.max(0.0).sqrt()))
+}
+
+/// Relative regularisation, which keeps a parameter without any information finite.
+pub const REGULAR: f64 = 1e-13;
+/// Upper limit of the fraction of information that is attributed to noise. The sums over so few
+/// lines scatter themselves, so that a larger fraction is not significant.
+const MOSTLY_NOISE: f64 = 0.8;
+
+/// Response of the parameters to data and priors, and their covariance.
+#[derive(Debug, Clone)]
+pub struct Certainty {
+    /// Response to measured data and priors: half the inverse of the posterior's curvature.
+    pub answer: DMatrix<f64>,
+    /// Covariance of the parameters, without any factor for misfit.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Scale of each parameter. Metres and kilograms occur together: only the scaled matrix can be
+/// factorised.
+pub fn units(information: &DMatrix<f64>) -> DVector<f64> {
+    information.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 })
+}
+
+/// `matrix` in these scales.
+pub fn scaled(matrix: &DMatrix<f64>, unit: &DVector<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(unit.len(), unit.len(), |i, j| matrix[(i, j)] * unit[i] * unit[j])
+}
+
+/// Certainty of the most likely parameters `p`, whose `information` includes the contribution of
+/// noise.
+///
+/// # Errors
+/// [`ContactError::NotIdentified`] if the information matrix is not positive definite.
+pub fn certainty(
+    blocks: &[Block],
+    bins: &[Bin],
+    p: &[f64],
+    information: &DMatrix<f64>,
+    shared: f64,
+) -> Result<Certainty, ContactError> {
+    let of_noise: Vec<(usize, Normal)> =
+        bins.par_iter().map(|bin| (bin.block, of_noise(blocks, bin, p))).collect();
+    let (noise, _) = summed(blocks, of_noise.iter().map(|(block, normal)| (*block, normal)), p.len(), shared);
+    let unit = units(information);
+    let regular = scaled(information, &unit) + DMatrix::identity(unit.len(), unit.len()) * REGULAR;
+    let feigned = Feigned::of(regular, &scaled(&noise, &unit)).ok_or_else(ContactError::no_force)?;
+    let inverse = |power: i32| {
+        let weight = |of_noise: f64| (1.0 - of_noise.clamp(0.0, MOSTLY_NOISE)).powi(-power);
+        // the information is half of the curvature
+        scaled(&(0.5 * feigned.weighed(weight)), &unit)
+    };
+    Ok(Certainty { answer: inverse(1), covariance: inverse(2) })
+}
+
+fn of_noise(blocks: &[Block], bin: &Bin, p: &[f64]) -> Normal {
+    let block = &blocks[bin.block];
+    let mut normal = Normal::none(block.parameters.len());
+    for residual in &bin.residuals {
+        normal.add_of_noise(block, residual.line, p);
+    }
+    normal
+}
+
+/// Width of the bins whose lines are summed and judged together, Hz.
+pub const BIN_HZ: f64 = 25.0;
+
+/// Motion at every line of every block.
+pub type Motion = Vec<Vec<DVector<Complex<f64>>>>;
+
+/// The lines of one block in one bin.
+#[derive(Debug, Clone)]
+pub struct Bin {
+    /// Index of the block.
+    pub block: usize,
+    /// Its lowest frequency, Hz.
+    pub low_hz: f64,
+    /// Normal equations of its lines.
+    pub normal: Normal,
+    /// Residuals of each row at each line, divided by the noise.
+    pub residuals: Vec<Residual>,
+    motion: Vec<DVector<Complex<f64>>>,
+}
+
+/// Evaluates all blocks, bin by bin.
+pub fn evaluate(blocks: &[Block], p: &[f64], before: Option<&Motion>) -> Result<Vec<Bin>, ContactError> {
+    let mut tasks: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
+    for (b, block) in blocks.iter().enumerate() {
+        let mut from = 0;
+        while let Some(first) = block.lines.get(from) {
+            let end_hz = (first.frequency_hz / BIN_HZ).floor() * BIN_HZ + BIN_HZ;
+            let to = from + block.lines[from..].partition_point(|line| line.frequency_hz < end_hz);
+            tasks.push((b, from..to));
+            from = to;
+        }
+    }
+    let bins: Vec<Option<Bin>> =
+        tasks.into_par_iter().map(|(b, lines)| bin(blocks, b, lines, p, before)).collect();
+    bins.into_iter().collect::<Option<Vec<Bin>>>().ok_or_else(|| {
+        ContactError::NotIdentified("the points do not tell how arm B and specimen A move".into())
+    })
+}
+
+fn bin(
+    blocks: &[Block],
+    b: usize,
+    lines: std::ops::Range<usize>,
+    p: &[f64],
+    before: Option<&Motion>,
+) -> Option<Bin> {
+    let block = &blocks[b];
+    let low_hz = (block.lines[lines.start].frequency_hz / BIN_HZ).floor() * BIN_HZ;
+    let mut normal = Normal::none(block.parameters.len());
+    let mut motion = Vec::with_capacity(lines.len());
+    let mut residuals = Vec::with_capacity(lines.len());
+    for line in lines {
+        let shifts = before.filter(|_| !block.shifted_by.is_empty()).map(|motion| {
+            [0, 1].map(|axis| {
+                let mut shift = DVector::zeros(block.latent());
+                for (other, weights) in &block.shifted_by {
+                    if let Some(moved) = motion[*other].get(line) {
+                        shift += moved * Complex::from(weights[axis]);
+                    }
+                }
+                shift
+            })
+        });
+        let (moved, residual) = normal.add(block, line, p, shifts.as_ref())?;
+        motion.push(moved);
+        residuals.push(residual);
+    }
+    Some(Bin { block: b, low_hz, normal, residuals, motion })
+}
+
+/// The best-fitting motion of each line, by block.
+pub fn motions(blocks: &[Block], bins: &[Bin]) -> Motion {
+    let mut all: Motion = vec![Vec::new(); blocks.len()];
+    for bin in bins {
+        all[bin.block].extend(bin.motion.iter().cloned());
+    }
+    all
+}
+
+/// Information matrix and gradient of all bins together, for `count` parameters.
+pub fn summed<'a>(
+    blocks: &[Block],
+    bins: impl Iterator<Item = (usize, &'a Normal)>,
+    count: usize,
+    shared: f64,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let mut information = DMatrix::zeros(count, count);
+    let mut gradient = DVector::zeros(count);
+    let weight = shared.recip();
+    for (block, normal) in bins {
+        let own = &blocks[block].parameters;
+        for (i, to) in own.iter().enumerate() {
+            gradient[*to] += weight * normal.gradient[i];
+            for (j, other) in own.iter().enumerate() {
+                information[(*to, *other)] += weight * normal.information[(i, j)];
+            }
+        }
+    }
+    (information, gradient)
 }

@@ -1,9 +1,14 @@
 //! FRFs: one complex matrix per frequency line, with the names of its rows and columns and, if
 //! known, its noise.
+//!
+//! Checks of the values in an FRF matrix.
+//!
+//! Errors of FRFs.
+//!
+//! The quantity of a response, and the corresponding type of FRF.
 
-use super::error::FrfError;
-use super::quantity::MotionQuantity;
 use nalgebra::{Complex, ComplexField, DMatrix, DMatrixViewMut};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
@@ -313,6 +318,258 @@ fn find(names: &[String], wanted: &[String], side: &'static str) -> Result<Vec<u
         .collect()
 }
 
+impl Frf {
+    /// Refuses NaN and infinite values, naming the first.
+    ///
+    /// # Errors
+    /// [`FrfError::NotFinite`].
+    pub fn check_finite(&self) -> Result<(), FrfError> {
+        for (y, &frequency_hz) in self.lines().iter().zip(self.frequency_hz()) {
+            for (column, input) in self.inputs().iter().enumerate() {
+                for (row, output) in self.outputs().iter().enumerate() {
+                    let value = y[(row, column)];
+                    if !(value.re.is_finite() && value.im.is_finite()) {
+                        return Err(FrfError::NotFinite {
+                            output: output.clone(),
+                            input: input.clone(),
+                            frequency_hz,
+                        });
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a variance below zero, naming the first.
+    ///
+    /// # Errors
+    /// [`FrfError::NegativeVariance`].
+    pub fn check_variance(&self) -> Result<(), FrfError> {
+        for (own, &frequency_hz) in self.variance().into_iter().flatten().zip(self.frequency_hz()) {
+            let Some(at) = own.iter().position(|variance| *variance < 0.0) else { continue };
+            // nalgebra stores columns contiguously
+            let (row, column) = (at % own.nrows(), at / own.nrows());
+            let (output, input) = (self.outputs()[row].clone(), self.inputs()[column].clone());
+            return Err(FrfError::NegativeVariance { output, input, frequency_hz, variance: own[at] });
+        }
+        Ok(())
+    }
+
+    /// Refuses a coherence outside 0 to 1, naming the first place. A value outside by at most
+    /// [`COHERENCE_ROUNDING`] is attributed to rounding and set to the end of the range; the second
+    /// return value is the number of such corrections.
+    ///
+    /// # Errors
+    /// [`FrfError::Coherence`].
+    pub fn with_coherence_in_range(mut self) -> Result<(Frf, usize), FrfError> {
+        let Some(mut all) = self.coherence.take() else { return Ok((self, 0)) };
+        let mut rounded = 0;
+        for (own, &frequency_hz) in all.iter_mut().zip(self.frequency_hz()) {
+            let rows = own.nrows();
+            for (at, coherence) in own.iter_mut().enumerate() {
+                let clipped = coherence.clamp(0.0, 1.0);
+                let beyond = (*coherence - clipped).abs();
+                // NaN (unknown) is neither above nor below
+                if beyond > COHERENCE_ROUNDING {
+                    // nalgebra stores columns contiguously
+                    let (output, input) =
+                        (self.outputs()[at % rows].clone(), self.inputs()[at / rows].clone());
+                    return Err(FrfError::Coherence { output, input, frequency_hz, coherence: *coherence });
+                }
+                if beyond > 0.0 {
+                    *coherence = clipped;
+                    rounded += 1;
+                }
+            }
+        }
+        self.coherence = Some(all);
+        Ok((self, rounded))
+    }
+}
+
+/// Excess of a coherence beyond 0 to 1 that is attributed to rounding: sums in single precision and
+/// five printed digits give less.
+pub const COHERENCE_ROUNDING: f64 = 1e-5;
+
+/// Reasons why FRFs cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrfError {
+    /// The sizes of axis, names and matrices do not match.
+    #[error(
+        "line {line}: the FRF matrix is {rows} × {columns}, but there are {outputs} output and {inputs} input names"
+    )]
+    Shape {
+        /// Index of the line.
+        line: usize,
+        /// Rows found.
+        rows: usize,
+        /// Columns found.
+        columns: usize,
+        /// Output names given.
+        outputs: usize,
+        /// Input names given.
+        inputs: usize,
+    },
+    /// The number of matrices differs from that of frequencies.
+    #[error("{frequencies} frequencies but {matrices} FRF matrices: one matrix per line is needed")]
+    LineCount {
+        /// Frequencies given.
+        frequencies: usize,
+        /// Matrices given.
+        matrices: usize,
+    },
+    /// Variance or coherence have a different number of lines, rows or columns than the FRF.
+    #[error(
+        "the {what} has {found_lines} lines of {found_rows} × {found_columns}, the FRF {lines} lines of {rows} × {columns}"
+    )]
+    Beside {
+        /// `variance` or `coherence`.
+        what: &'static str,
+        /// Its lines.
+        found_lines: usize,
+        /// Rows of its first line, or of the first that differs.
+        found_rows: usize,
+        /// Columns of that line.
+        found_columns: usize,
+        /// Lines of the FRF.
+        lines: usize,
+        /// Rows of the FRF.
+        rows: usize,
+        /// Columns of the FRF.
+        columns: usize,
+    },
+    /// The frequency axis is not finite, non-negative and rising.
+    #[error("the frequency axis must be finite, not negative and rising: line {line} is {frequency_hz} Hz")]
+    Axis {
+        /// First line that is wrong.
+        line: usize,
+        /// Its frequency, Hz.
+        frequency_hz: f64,
+    },
+    /// The damping of the exponential window is not a finite number.
+    #[error("the exponential window's damping is {0} 1/s: a finite number that is not negative is needed")]
+    Damping(f64),
+    /// A name occurs twice among the outputs or the inputs.
+    #[error("the name `{name}` stands twice among the {side}: rename one of them")]
+    RepeatedName {
+        /// `outputs` or `inputs`.
+        side: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A requested row or column does not exist.
+    #[error("there is no `{name}` among the {side} ({available}): check the geometry against the FRF file")]
+    MissingName {
+        /// `outputs` or `inputs`.
+        side: &'static str,
+        /// The name.
+        name: String,
+        /// The available names.
+        available: String,
+    },
+    /// A value is NaN or infinite.
+    #[error(
+        "the FRF from `{input}` to `{output}` is not a number at {frequency_hz} Hz: repeat that cell or cut the line out"
+    )]
+    NotFinite {
+        /// The row's name.
+        output: String,
+        /// The column's name.
+        input: String,
+        /// The line, Hz.
+        frequency_hz: f64,
+    },
+    /// A variance is below zero.
+    #[error(
+        "the variance of the FRF from `{input}` to `{output}` is {variance} at {frequency_hz} Hz: a variance is zero or more, NaN where it is not known"
+    )]
+    NegativeVariance {
+        /// The row's name.
+        output: String,
+        /// The column's name.
+        input: String,
+        /// The line, Hz.
+        frequency_hz: f64,
+        /// The value given.
+        variance: f64,
+    },
+    /// A coherence is not between 0 and 1.
+    #[error(
+        "the coherence of the FRF from `{input}` to `{output}` is {coherence} at {frequency_hz} Hz: a coherence is from 0 to 1, NaN where it is not known; estimate it again or leave it out"
+    )]
+    Coherence {
+        /// The row's name.
+        output: String,
+        /// The column's name.
+        input: String,
+        /// The line, Hz.
+        frequency_hz: f64,
+        /// The value given.
+        coherence: f64,
+    },
+    /// A line at s = 0 cannot be divided by s.
+    #[error("line {line} is at s = 0: a {} has no receptance there; cut the line out", quantity.frf_name())]
+    DivisionByZero {
+        /// Index of the line.
+        line: usize,
+        /// What is stored.
+        quantity: MotionQuantity,
+    },
+}
+
+/// The quantity of a response: the numerator of an FRF, per newton of the hammer's force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MotionQuantity {
+    /// m; per force a receptance, m/N.
+    Displacement,
+    /// m/s; per force a mobility, m/(s N).
+    Velocity,
+    /// m/s²; per force an accelerance, m/(s² N).
+    Acceleration,
+}
+
+impl MotionQuantity {
+    /// All quantities, each the time derivative of the one before.
+    const ALL: [MotionQuantity; 3] =
+        [MotionQuantity::Displacement, MotionQuantity::Velocity, MotionQuantity::Acceleration];
+
+    /// The name used in record files.
+    pub fn name(self) -> &'static str {
+        match self {
+            MotionQuantity::Displacement => "displacement",
+            MotionQuantity::Velocity => "velocity",
+            MotionQuantity::Acceleration => "acceleration",
+        }
+    }
+
+    /// The quantity called `name`, if there is one.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|q| q.name() == name.trim().to_lowercase())
+    }
+
+    /// Name of the FRF of such a response, also used in files.
+    pub fn frf_name(self) -> &'static str {
+        match self {
+            MotionQuantity::Displacement => "receptance",
+            MotionQuantity::Velocity => "mobility",
+            MotionQuantity::Acceleration => "accelerance",
+        }
+    }
+
+    /// The quantity whose FRFs are called `name`, if there is one.
+    pub fn from_frf_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|q| q.frf_name() == name.trim().to_lowercase())
+    }
+
+    /// Power of s by which the displacement is multiplied: 0, 1 or 2.
+    pub fn order_of_s(self) -> i32 {
+        self as i32
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -405,5 +662,45 @@ mod tests {
         assert!(of([100.0, 200.0, 300.0], ["a", "b"]).is_ok());
         assert!(matches!(of([100.0, 200.0, 300.0], ["a", "a"]), Err(FrfError::RepeatedName { .. })));
         assert!(matches!(of([100.0, 100.0, 300.0], ["a", "b"]), Err(FrfError::Axis { line: 1, .. })));
+    }
+}
+
+#[cfg(test)]
+mod checks_tests {
+    use super::*;
+    use crate::frf::MotionQuantity;
+    use nalgebra::{Complex, DMatrix};
+
+    fn with(coherence: f64) -> Frf {
+        let line = || DMatrix::from_element(2, 1, Complex::new(1.0, 0.0));
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let frf = Frf::new(
+            vec![0.0, 50.0],
+            0.0,
+            MotionQuantity::Velocity,
+            names(&["A1:x", "A1:y"]),
+            names(&["AZ1"]),
+            vec![line(), line()],
+        );
+        let mut all = vec![DMatrix::from_element(2, 1, 0.5); 2];
+        all[1][(1, 0)] = coherence;
+        frf.and_then(|frf| frf.with_coherence(all)).expect("all agree")
+    }
+
+    #[test]
+    fn a_coherence_outside_zero_to_one_is_named_and_a_rounded_one_is_clipped() {
+        for wrong in [1.246, 1.001, -0.01, f64::INFINITY] {
+            let text = with(wrong).with_coherence_in_range().expect_err("no coherence").to_string();
+            for part in ["coherence", "`AZ1`", "`A1:y`", "50 Hz", &wrong.to_string()] {
+                assert!(text.contains(part), "{text} lacks {part}");
+            }
+        }
+        for (rounded, clipped) in [(1.000_001, 1.0), (-1e-7, 0.0)] {
+            let (frf, count) = with(rounded).with_coherence_in_range().expect("rounding");
+            assert_eq!((frf.coherence().expect("kept")[1][(1, 0)], count), (clipped, 1));
+        }
+        assert_eq!(with(1.0).with_coherence_in_range().expect("in range").1, 0);
+        let (unknown, count) = with(f64::NAN).with_coherence_in_range().expect("not known");
+        assert!(unknown.coherence().expect("kept")[1][(1, 0)].is_nan() && count == 0);
     }
 }

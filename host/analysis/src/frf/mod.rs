@@ -1,15 +1,12 @@
 //! Frequency response functions: one complex matrix per line, the quantity of its values, and their
 //! noise.
 
-mod checks;
 pub mod common_lines;
-mod error;
 mod matrix;
 pub mod noise;
-mod quantity;
 
-pub use checks::COHERENCE_ROUNDING;
-pub use error::FrfError;
+pub use matrix::COHERENCE_ROUNDING;
 pub use matrix::Frf;
+pub use matrix::FrfError;
+pub use matrix::MotionQuantity;
 pub(crate) use matrix::block;
-pub use quantity::MotionQuantity;

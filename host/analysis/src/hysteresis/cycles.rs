@@ -3,18 +3,23 @@
 //! One minute of a record has thousands of cycles, and storing all of them as vectors would take
 //! several times the memory of the record. They are therefore cut on demand, on all cores, and
 //! whatever is needed of all cycles is summed in the same pass.
+//!
+//! One closed cycle of a record.
+//!
+//! First and third harmonic of a cycle's signals.
+//!
+//! Integration of velocity to displacement.
 
 use super::HysteresisError;
-use super::correction::Correction;
-use super::cycle::Cycle;
-use super::harmonics::{Harmonics, Wheels};
-use super::integration::closed_cycle;
 use super::loops::{energy, swing};
 use super::record::{HysteresisRecord, RelativeMotion};
-use super::sums::{dot, mean};
+use super::static_arm::Correction;
 use super::timing::Timing;
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
+use crate::vectors::{dot, mean};
+use num_complex::Complex;
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// A cycle with fewer samples than this is not a loop.
@@ -478,6 +483,107 @@ fn cubic(x: &[f64], t: f64, drift: f64, to: &mut [f64]) {
     });
 }
 
+/// One closed cycle: M equidistant points of one period.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cycle {
+    /// Relative displacement, mean removed, m.
+    pub displacement_m: Vec<f64>,
+    /// Relative velocity, mean removed, m/s.
+    pub velocity_m_per_s: Vec<f64>,
+    /// Tangential force, mean removed, N.
+    pub force_n: Vec<f64>,
+}
+
+impl Cycle {
+    pub(super) fn signals(&self) -> [&[f64]; 3] {
+        [&self.displacement_m, &self.velocity_m_per_s, &self.force_n]
+    }
+}
+
+/// Amplitudes of one signal over one cycle: at the fundamental, and at its third harmonic.
+pub(super) type Pair = [Complex<f64>; 2];
+
+/// First and third harmonic of one cycle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Harmonics {
+    /// Of Δx, m.
+    pub displacement: Pair,
+    /// Of T, N.
+    pub force: Pair,
+}
+
+/// Cosine and negative sine of the first and third harmonic, sampled at the points of a cycle.
+pub(super) struct Wheels([[Vec<f64>; 2]; 2]);
+
+impl Wheels {
+    /// For cycles of `points` points.
+    pub fn new(points: usize) -> Self {
+        let turn = |times: usize, part: fn(f64) -> f64| -> Vec<f64> {
+            // the remainder keeps the angle small, so the third harmonic is as accurate as the
+            // first
+            let angle = |i: usize| TAU * (times * i % points) as f64 / points as f64;
+            (0..points).map(|i| 2.0 / points as f64 * part(angle(i))).collect()
+        };
+        Self([1, 3].map(|times| [turn(times, f64::cos), turn(times, |angle| -angle.sin())]))
+    }
+
+    /// Amplitudes of one signal.
+    pub fn harmonics(&self, x: &[f64]) -> Pair {
+        self.0.each_ref().map(|[cosine, sine]| Complex::new(dot(cosine, x), dot(sine, x)))
+    }
+}
+
+/// Weights of the six values around one step in its integral, times 1440: the quadrature is exact
+/// for polynomials of fifth degree.
+const STEP: [f64; 6] = [11.0, -93.0, 802.0, 802.0, -93.0, 11.0];
+
+/// Displacement over one closed cycle from its velocities (m/s, `dt_s` apart), into `x`: the mean
+/// velocity is removed first so that the loop closes, each step is integrated from the six values
+/// around it, and the mean displacement is removed last. The trapezoid rule would underestimate a
+/// sine of 16 samples per cycle by 1.3 %; this rule is accurate to 1e-5.
+///
+/// One whole cycle of a steady vibration has zero mean velocity: what is removed is the
+/// vibrometer's offset and the random walk of the noise. A straight line fitted to the displacement
+/// of a few cycles is *not* equivalent and biases the stiffness.
+pub fn closed_cycle(velocity: &[f64], dt_s: f64, x: &mut Vec<f64>) {
+    let offset = mean(velocity);
+    let n = velocity.len();
+    x.clear();
+    x.resize(n, 0.0);
+    let mut at = 0.0;
+    for i in 1..n {
+        // the step from value i − 1 to value i
+        let step: f64 = if i >= 3 && i + 2 < n {
+            STEP.iter().zip(&velocity[i - 3..i + 3]).map(|(weight, v)| weight * (v - offset)).sum()
+        } else {
+            // the cycle is periodic: its last values precede its first ones
+            (0..6).map(|j| STEP[j] * (velocity[(i + j + 3 * n - 3) % n] - offset)).sum()
+        };
+        at += step * dt_s / 1440.0;
+        x[i] = at;
+    }
+    let centre = mean(x);
+    for value in x {
+        *value -= centre;
+    }
+}
+
+/// Displacement of an open record (m) by the trapezoid rule from 0, after subtracting `offset`
+/// (m/s).
+pub fn open_record(velocity: &[f64], offset: f64, dt_s: f64) -> Vec<f64> {
+    let mut at = 0.0;
+    velocity
+        .iter()
+        .enumerate()
+        .map(|(i, v)| {
+            if i > 0 {
+                at += 0.5 * dt_s * (velocity[i - 1] + v - 2.0 * offset);
+            }
+            at
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -494,6 +600,49 @@ mod tests {
             for (j, found) in found.iter().enumerate() {
                 let expected = parabola(from + j as f64 * step);
                 assert!((found - expected).abs() < 1e-9, "{from} {step} {j}: {found} for {expected}");
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod harmonics_tests {
+    use super::*;
+
+    #[test]
+    fn amplitudes_of_a_sum_of_waves_come_back() {
+        for points in [16, 205, 512] {
+            let at = |i: usize| TAU * i as f64 / points as f64;
+            let wave = |i: usize| 0.4 + 3.0 * (at(i) + 0.3).cos() + 0.5 * (3.0 * at(i) - 1.0).cos();
+            let x: Vec<f64> = (0..points).map(wave).collect();
+            let [first, third] = Wheels::new(points).harmonics(&x);
+            // rounding only
+            assert!((first - Complex::from_polar(3.0, 0.3)).norm() < 1e-12, "{first}");
+            assert!((third - Complex::from_polar(0.5, -1.0)).norm() < 1e-12, "{third}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod integration_tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::TAU;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 64, rng_seed: proptest::test_runner::RngSeed::Fixed(21), ..ProptestConfig::default() })]
+
+        /// An offset of any size has no effect over a whole cycle.
+        #[test]
+        fn a_cycle_comes_back_whatever_the_offset(phase in 0.0..TAU, offset in -1e-2..1e-2f64, n in 16usize..700) {
+            let (w, dt) = (TAU * 80.0, 1.0 / (80.0 * n as f64));
+            let v: Vec<f64> = (0..n).map(|i| 1e-6 * w * (w * dt * i as f64 + phase).cos() + offset).collect();
+            let mut x = Vec::new();
+            closed_cycle(&v, dt, &mut x);
+            for (i, x) in x.iter().enumerate() {
+                // error of the six-value rule: 191/60480 (ω dt)⁶, and rounding
+                let exact = 1e-6 * (w * dt * i as f64 + phase).sin();
+                prop_assert!((x - exact).abs() < 1e-6 * ((TAU / n as f64).powi(6) / 300.0 + 1e-9 * (1.0 + offset.abs() / 1e-6)));
             }
         }
     }

@@ -4,11 +4,11 @@
 //! identical in every cycle. But hum has harmonics, and those that do not coincide with the loop's
 //! own harmonics are isolated in the spectrum of the whole record.
 
+use super::dominant_frequency::{line_sum, turns};
 use super::finding::LoopFinding;
-use super::line_sums::{line_sum, turns};
 use super::record::{HysteresisRecord, RelativeMotion};
 use crate::parallel::{join, prelude::*};
-use crate::transforms::forward;
+use crate::spectra::record_transform::forward;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 

@@ -1,7 +1,7 @@
 //! Simulated loops for tests: a contact's law under a sine, measured by sensors with noise, delays
 //! and faults.
 
-use super::delays::in_step;
+use super::record::in_step;
 use super::{HysteresisRecord, LoopAnalysis, RelativeMotion, analyse};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};

@@ -17,46 +17,29 @@
 pub mod analyse;
 pub mod backbone;
 pub mod compliance;
-pub mod correction;
-pub mod cycle;
 pub mod cycles;
-pub mod delays;
 mod dominant_frequency;
 pub mod finding;
-pub mod first_cycle;
-pub mod friction_harmonic;
 pub mod hammer_slip;
-mod harmonics;
-pub mod hit_response;
 mod hum;
 pub mod impact;
-pub mod impact_spectra;
-pub mod integration;
-mod law_fit;
-mod line_sums;
-pub mod loop_analysis;
 pub mod loops;
 pub mod phase_split;
-mod plateau;
-pub mod reconstruction;
 pub mod record;
 mod repair;
-pub mod repeated_peak;
 pub mod shape;
 pub mod static_arm;
 mod steady;
 mod stick;
-mod sums;
 mod timing;
-pub mod tones;
 
+pub use analyse::{Kind, LoopAnalysis};
 pub use analyse::{analyse, analyse_both, analyse_corrected};
-pub use correction::Correction;
 pub use finding::LoopFinding;
-pub use loop_analysis::{Kind, LoopAnalysis};
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};
 pub use shape::{Shape, ShapeEvidence};
+pub use static_arm::Correction;
 
 /// Why a record gives no loop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

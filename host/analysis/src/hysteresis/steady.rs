@@ -1,24 +1,24 @@
 //! Analyses a shaker record: averages its cycles, and evaluates the average loop and its scatter.
 
 use super::HysteresisError;
-use super::cycle::Cycle;
+use super::analyse::{Kind, LoopAnalysis};
+use super::cycles::Cycle;
+use super::cycles::Harmonics;
 use super::cycles::{Force, Steady, Summed};
 use super::finding::LoopFinding;
-use super::friction_harmonic::Quadratures;
-use super::harmonics::Harmonics;
 use super::hum;
-use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{
     OverCycles, closed_swing, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
 };
-use super::plateau::{Plateaus, Play};
 use super::record::HysteresisRecord;
 use super::repair::{Delay, Repair, delay};
+use super::shape::Quadratures;
 use super::shape::{Shape, ShapeEvidence, shape};
 use super::stick::{
     BEFORE_PLAY, Part, bends, first_part, flank_part, friction_limit, slope_over, strokes,
     tangent_at_reversal,
 };
+use super::stick::{Plateaus, Play};
 use super::timing::{Timing, runs_at};
 use crate::median::middle;
 use crate::parallel::join;

@@ -1,11 +1,11 @@
 //! Start times of the cycles of a steady record: at the stated frequency, or at the measured one.
 
 use super::HysteresisError;
+use super::dominant_frequency::line_sum;
 use super::dominant_frequency::{dominant_frequency, level};
-use super::line_sums::line_sum;
 use super::record::{HysteresisRecord, Relative};
-use super::sums::{dot, mean};
 use crate::parallel::prelude::*;
+use crate::vectors::{dot, mean};
 use num_complex::Complex;
 use std::f64::consts::TAU;
 

@@ -4,11 +4,11 @@
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
 use super::jackknife;
-use super::lent::Lent;
-use super::lines::{Lines, Put};
-use super::order::Order;
+use super::record_transform::Lent;
+use super::record_transform::Order;
+use super::record_transform::Windowed;
+use super::record_transform::{Lines, Put};
 use super::record_transform::{RecordTransform, check_finite};
-use super::windowed::Windowed;
 use crate::parallel::{self, prelude::*};
 use crate::vectors::wide;
 use bytemuck::{cast_slice, cast_slice_mut};

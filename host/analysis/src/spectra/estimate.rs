@@ -1,13 +1,18 @@
 //! From impact records to spectra: finds the start of each hit, applies windows, and averages
 //! spectra.
+//!
+//! Impact records: the raw signals of the hammer and the sensors, before any processing.
+//!
+//! The band in which the hammer effectively excited the structure.
 
 use super::SpectraError;
 use super::average::SpectraAverage;
 use super::cross_spectra::CrossSpectra;
-use super::impact_records::ImpactRecords;
 use super::pulse::Pulse;
+use super::record_transform::Windowed;
 use super::window::{Decay, PulseSamples, ResponseWeighting, Windowing};
-use super::windowed::Windowed;
+use crate::band::Band;
+use crate::frf::MotionQuantity;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -197,4 +202,62 @@ pub(super) fn summed(
         },
     )?;
     Ok(average)
+}
+
+/// Hits of one impact position with the same response channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImpactRecords {
+    /// Sampling rate, Hz.
+    pub fs_hz: f64,
+    /// Hammer force \[hit\]\[sample\], N.
+    pub force_n: Vec<Vec<f64>>,
+    /// Responses \[hit\]\[channel\]\[sample\], SI.
+    pub response: Vec<Vec<Vec<f64>>>,
+    /// Quantity of the responses.
+    pub quantity: MotionQuantity,
+}
+
+/// The band around the maximum of the force auto-spectrum in which the spectrum stays within
+/// `drop_db` (conventionally 6 dB) of it.
+///
+/// `s_ff` is a power: −6 dB is a factor of four. `None` when there is no line above 0 Hz or no
+/// force.
+pub fn usable_band(frequency_hz: &[f64], s_ff: &[f64], drop_db: f64) -> Option<Band> {
+    let first = frequency_hz.iter().position(|f| *f > 0.0)?;
+    let n = frequency_hz.len().min(s_ff.len());
+    let top = (first..n).max_by(|&a, &b| s_ff[a].total_cmp(&s_ff[b]))?;
+    let limit = s_ff[top] * 10f64.powf(-drop_db / 10.0);
+    if !limit.is_finite() || limit <= 0.0 {
+        return None;
+    }
+    let low = (first..=top).rev().take_while(|&l| s_ff[l] >= limit).last()?;
+    let high = (top..n).take_while(|&l| s_ff[l] >= limit).last()?;
+    Some(Band { low_hz: frequency_hz[low], high_hz: frequency_hz[high] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_half_sine_of_0_41_ms_reaches_2_khz() {
+        let f: Vec<f64> = (0..1000).map(|i| 5.0 * i as f64).collect();
+        // |F| of a half sine of width T: cos(π f T) / (1 − (2 f T)²)
+        let s: Vec<f64> = f
+            .iter()
+            .map(|f| {
+                let x = f * 0.41e-3;
+                if (x - 0.5).abs() < 1e-9 {
+                    std::f64::consts::FRAC_PI_4.powi(2)
+                } else {
+                    ((std::f64::consts::PI * x).cos() / (1.0 - 4.0 * x * x)).powi(2)
+                }
+            })
+            .collect();
+        let band = usable_band(&f, &s, 6.0).expect("a band");
+        assert_eq!(band.low_hz, 5.0);
+        // −6 dB of a half sine lies at 0.82 / T = 2.0 kHz
+        assert!((band.high_hz - 2000.0).abs() < 30.0, "{band:?}");
+        assert_eq!(usable_band(&f, &vec![0.0; 1000], 6.0), None);
+    }
 }

@@ -11,29 +11,20 @@
 pub mod average;
 pub mod cross_spectra;
 pub mod estimate;
-pub mod estimators;
-mod half_length;
-pub mod impact_records;
 pub mod jackknife;
-mod lent;
-mod lines;
 pub mod odd_hit;
-mod order;
-mod pieces;
 pub mod pulse;
-mod record_transform;
-pub mod usable_band;
+pub(crate) mod record_transform;
 pub mod window;
-pub mod windowed;
 
 pub use crate::frf::MotionQuantity;
 pub use average::SpectraAverage;
 pub use cross_spectra::CrossSpectra;
+pub use estimate::ImpactRecords;
+pub use estimate::usable_band;
 pub use estimate::{FrfSettings, Origin, Summing, estimate};
-pub use impact_records::ImpactRecords;
 pub use odd_hit::{Fit, OddHit, odd_hit};
 pub use pulse::{Pulse, reversed_peak_n, several_hits_s};
-pub use usable_band::usable_band;
 pub use window::{ForceWeighting, PulseSamples, Windowing};
 
 /// Reasons why records cannot be converted to FRFs.

@@ -190,9 +190,9 @@ fn orders(count: usize) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::super::estimate::{FrfSettings, estimate};
-    use super::super::impact_records::ImpactRecords;
     use super::*;
     use crate::frf::MotionQuantity;
+    use crate::spectra::estimate::ImpactRecords;
     use std::f64::consts::{PI, TAU};
 
     const FS: f64 = 4096.0;

@@ -7,7 +7,7 @@ use super::internal_dofs::Rearrangement;
 use super::lanes::{Cell, Matrix, Pool, Sure, inverse, lines, minus, plus, product, times, to_left_of};
 use super::reduced::{Reduced, RefusedReason};
 use super::rooms::{Rooms, Side};
-use super::with_care::{Refusal, Work};
+use super::solve::{Refusal, Work};
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix};

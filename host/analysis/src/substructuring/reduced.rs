@@ -1,16 +1,16 @@
 //! One IDM set's virtual points with their admittances, line by line.
 
 use super::back_coupling::BackCoupling;
-use super::consistency::consistency;
 use super::decoupling::{ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock};
 use super::geometry::Grouping;
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, balance, scaled};
 use super::internal_dofs::Which;
 use super::method::Method;
-use super::plausibility::{passivity, reciprocity};
 use super::pseudo_inverse::full_rank_inverse;
 use super::quality::VirtualPointQuality;
+use super::quality::consistency;
+use super::quality::{passivity, reciprocity};
 use super::rooms::{Balanced, Rooms, Side};
 use crate::band::Band;
 use crate::parallel::prelude::*;

@@ -1,8 +1,8 @@
 //! Checks for a hidden resonance that only one specimen takes part in.
 
+use crate::hysteresis::compliance::{CLEAR, over_noise};
 use crate::hysteresis::compliance::{ContactCompliance, ImaginaryPeak};
 use crate::hysteresis::phase_split::{Curve, PhaseSplit};
-use crate::hysteresis::repeated_peak::{CLEAR, over_noise};
 use crate::results::{FrfCurve, Role};
 
 /// If the phase between the specimens stays below this, nothing is hidden.

@@ -6,25 +6,24 @@
 //! of freedom that it does not couple. c denotes the interface (virtual point) degrees of freedom,
 //! i the internal ones. Rows and columns of rotations may be scaled by a length beforehand: the
 //! methods are equivariant, and it reduces rounding.
+//!
+//! Eq. (A.1): inverse substructuring.
+//!
+//! Eq. (A.2): primal decoupling.
+//!
+//! Eq. (A.3): decoupling with interface degrees of freedom only.
+//!
+//! Eq. (3) in its exact least-squares form, for any number of internal degrees of freedom ≥ n_c.
+//!
+//! Eq. (3) as printed in the paper.
 
-mod fixture;
-mod interface;
-mod internal;
-mod internal_printed;
-mod inverse;
-mod primal;
+use super::product::product;
+use super::pseudo_inverse::{RankLost, full_rank_inverse, rank};
+use nalgebra::{Complex, DMatrix};
 
 pub use fixture::{Weakening, remove_fixture};
-pub use interface::interface;
-pub(super) use interface::stiffnesses;
-pub use internal::internal;
-pub(super) use internal::{Factors, factors};
-pub(super) use internal_printed::with_m_inverse;
-pub use internal_printed::{internal_printed, observed_rank};
-pub use inverse::{InverseBlock, inverse, inverse_of};
-pub use primal::{PrimalBlock, primal, primal_of};
 
-use super::pseudo_inverse::RankLost;
+mod fixture;
 
 /// Name of Y^AJB_cc in errors.
 pub(super) const ASSEMBLY: &str = "the assembly's interface admittance";
@@ -54,5 +53,242 @@ pub enum DecouplingError {
     RankLost(#[from] RankLost),
 }
 
+/// The off-diagonal block of Eq. (A.1) that is used. For exact data of a reciprocal structure they
+/// are equal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InverseBlock {
+    /// c(A), c(B).
+    Ab,
+    /// c(B), c(A).
+    Ba,
+}
+
+/// Z^J = minus an off-diagonal block of (Y^AJB_cc)⁻¹. Needs neither Y^A nor Y^B, so it does not
+/// depend on changes of A between configurations. `y_ajb` is 2n_c × 2n_c, A's virtual point first.
+///
+/// Implements Eq. (A.1).
+///
+/// # Errors
+/// Y^AJB_cc is singular.
+pub fn inverse(
+    block: InverseBlock,
+    y_ajb: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    Ok(inverse_of(block, &full_rank_inverse(y_ajb, ASSEMBLY)?))
+}
+
+/// The same from a given (Y^AJB_cc)⁻¹.
+pub fn inverse_of(block: InverseBlock, z_ajb: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+    let n = z_ajb.nrows() / 2;
+    let at = match block {
+        InverseBlock::Ab => (0, n),
+        InverseBlock::Ba => (n, 0),
+    };
+    z_ajb.view(at, (n, n)).map(|z| -z)
+}
+
+/// The diagonal block of Eq. (A.2) that is used. (The off-diagonal ones are Eq. (A.1) again.)
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PrimalBlock {
+    /// c(A), c(A): needs Y^A only.
+    A,
+    /// c(B), c(B): needs Y^B only, so a clamp that changes A between configurations does not affect
+    /// it.
+    B,
+}
+
+/// Z^J = Z^AJB_SS − Z^S.
+///
+/// Implements Eq. (A.2), one diagonal block; the printed lower-right subscript is a misprint.
+///
+/// `y_s` is the admittance of the substructure of that block (n_c × n_c), `y_ajb` 2n_c × 2n_c, A's
+/// virtual point first.
+///
+/// # Errors
+/// Y^AJB or Y^S is singular.
+pub fn primal(
+    block: PrimalBlock,
+    y_s: &DMatrix<Complex<f64>>,
+    y_ajb: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    primal_of(block, y_s, &full_rank_inverse(y_ajb, ASSEMBLY)?)
+}
+
+/// The same from a given (Y^AJB_cc)⁻¹.
+///
+/// # Errors
+/// Y^S is singular.
+pub fn primal_of(
+    block: PrimalBlock,
+    y_s: &DMatrix<Complex<f64>>,
+    z_ajb: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let n = y_s.nrows();
+    let at = match block {
+        PrimalBlock::A => 0,
+        PrimalBlock::B => n,
+    };
+    Ok(z_ajb.view((at, at), (n, n)) - full_rank_inverse(y_s, SUBSTRUCTURE)?)
+}
+
+/// Z^J with W = Y^A + Y^B and D = Y^AJB_AA − Y^AJB_AB − Y^AJB_BA + Y^AJB_BB: Y^J = −W + W (W − D)⁻¹
+/// W.
+///
+/// Implements Eqs. (A.3) and (A.4), sign corrected.
+///
+/// It is evaluated in Z, where the same identity is Z^J = D⁻¹ − W⁻¹: the relative motion in the
+/// assembly is resisted by the joint and the two substructures in parallel. `y_ajb` is 2n_c × 2n_c,
+/// A's virtual point first.
+///
+/// # Errors
+/// D or W is singular.
+pub fn interface(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    y_ajb: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let [d_inverse, w_inverse] = stiffnesses(y_a, y_b, y_ajb)?;
+    Ok(d_inverse - w_inverse)
+}
+
+/// D⁻¹ and W⁻¹.
+pub(crate) fn stiffnesses(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    y_ajb: &DMatrix<Complex<f64>>,
+) -> Result<[DMatrix<Complex<f64>>; 2], DecouplingError> {
+    let n = y_a.nrows();
+    let block = |r: usize, c: usize| y_ajb.view((r * n, c * n), (n, n));
+    let d = block(0, 0) - block(0, 1) - block(1, 0) + block(1, 1);
+    let d_inverse = full_rank_inverse(&d, "the assembly's relative admittance")?;
+    Ok([d_inverse, full_rank_inverse(&(y_a + y_b), "Y^A + Y^B")?])
+}
+
+/// Z^J from G = (P⁺ M Q⁺)⁻¹, Y^J = G − Y^A_cc − Y^B_cc.
+///
+/// Implements Eq. (3), solved for G by least squares.
+///
+/// `p` = Y^B_{i,c} (responses on B × n_c), `q` = Y^A_{c,i} (n_c × impacts on A), `m` =
+/// Y^AJB_{i(B),i(A)}. Because M = P G⁻¹ Q exactly, P and Q are inverted without truncation, and M,
+/// which is singular for n_i > n_c, is never inverted.
+///
+/// Tol and Özgüven's other three rearrangements of Eq. (1) have the same form with other factors,
+/// and are evaluated here too: hits and responses on A with M = Y^A_ii − Y^AJB_ii, P = Y^A_ic, Q =
+/// Y^A_ci; hits on B and responses on A with M = Y^AJB_{i(A),i(B)}, P = Y^A_ic, Q = Y^B_ci; both on
+/// B with M = Y^B_ii − Y^AJB_ii, P = Y^B_ic, Q = Y^B_ci. If M is a difference of two measurements
+/// it is small compared with both, and therefore sensitive to noise.
+///
+/// # Errors
+/// Too few internals, or P or Q without full rank.
+pub fn internal(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    Ok(factors(y_a, y_b, p, m, q)?.z)
+}
+
+/// Z^J and the matrices that it is computed from.
+pub(crate) struct Factors {
+    pub(crate) p_plus: DMatrix<Complex<f64>>,
+    pub(crate) q_plus: DMatrix<Complex<f64>>,
+    pub(crate) g: DMatrix<Complex<f64>>,
+    pub(crate) z: DMatrix<Complex<f64>>,
+}
+
+/// As [`internal`], with the factors.
+pub(crate) fn factors(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<Factors, DecouplingError> {
+    let needed = y_a.nrows();
+    let (responses, impacts) = m.shape();
+    if responses.min(impacts) < needed {
+        return Err(DecouplingError::TooFewInternals { impacts, responses, needed });
+    }
+    let p_plus =
+        full_rank_inverse(p, "P, the admittance between the virtual point and the internal responses,")?;
+    let q_plus =
+        full_rank_inverse(q, "Q, the admittance between the internal impacts and the virtual point,")?;
+    let g = full_rank_inverse(&product(&product(&p_plus, m), &q_plus), "P⁺ M Q⁺")?;
+    let z = full_rank_inverse(&(&g - y_a - y_b), "the joint's admittance")?;
+    Ok(Factors { p_plus, q_plus, g, z })
+}
+
+/// Z^J from Y^J = Q M⁻¹ P − Y^A_cc − Y^B_cc.
+///
+/// Implements Eq. (3), as printed.
+///
+/// `p` = Y^B_{i,c}, `q` = Y^A_{c,i}, `m` = Y^AJB_{i(B),i(A)}. Exact only for n_i = n_c. With n_i <
+/// n_c the result is Y^J − G (I − Π) with Π of rank n_i ([`observed_rank`]): correct for the forces
+/// that the internals generate, −(Y^A + Y^B) elsewhere.
+///
+/// # Errors
+/// M, or the resulting admittance, is singular.
+pub fn internal_printed(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<DMatrix<Complex<f64>>, DecouplingError> {
+    let [z, _] = with_m_inverse(y_a, y_b, p, m, q)?;
+    Ok(z)
+}
+
+/// Z^J as [`internal_printed`] gives it, and M⁻¹.
+pub(crate) fn with_m_inverse(
+    y_a: &DMatrix<Complex<f64>>,
+    y_b: &DMatrix<Complex<f64>>,
+    p: &DMatrix<Complex<f64>>,
+    m: &DMatrix<Complex<f64>>,
+    q: &DMatrix<Complex<f64>>,
+) -> Result<[DMatrix<Complex<f64>>; 2], DecouplingError> {
+    let m_inverse = full_rank_inverse(m, "M = Y^AJB between B's and A's internals")?;
+    let admittance = product(&product(q, &m_inverse), p) - y_a - y_b;
+    Ok([full_rank_inverse(&admittance, "the joint's admittance")?, m_inverse])
+}
+
+/// Rank of Π: the number of directions of interface force, of n_c, that these internals observe. It
+/// cannot exceed the rank of P or Q, whatever the joint is.
+pub fn observed_rank(p: &DMatrix<Complex<f64>>, q: &DMatrix<Complex<f64>>) -> usize {
+    rank(p).min(rank(q))
+}
+
 #[cfg(test)]
 mod exactness_tests;
+
+#[cfg(test)]
+mod interface_tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 32, rng_seed: proptest::test_runner::RngSeed::Fixed(5), ..ProptestConfig::default() })]
+
+        /// The form used equals the inverse of the paper's (sign corrected) admittance form.
+        #[test]
+        fn equals_the_admittance_form(v in prop::collection::vec(-1.0..1.0f64, 2 * (9 + 9 + 36))) {
+            let take = |from: usize, n: usize, shift: f64| DMatrix::from_fn(n, n, |r, c| {
+                let i = from + 2 * (r * n + c);
+                Complex::new(v[i] + if r == c { shift } else { 0.0 }, v[i + 1])
+            });
+            let (y_a, y_b, y_ajb) = (take(0, 3, 4.0), take(18, 3, 4.0), take(36, 6, 3.0));
+            let w = &y_a + &y_b;
+            let b = |r: usize, c: usize| y_ajb.view((r * 3, c * 3), (3, 3)).clone_owned();
+            let x = &w - (b(0, 0) - b(0, 1) - b(1, 0) + b(1, 1));
+            let x_inverse = x.try_inverse();
+            prop_assume!(x_inverse.is_some());
+            let y_j = &w * x_inverse.expect("assumed") * &w - &w;
+            let z = interface(&y_a, &y_b, &y_ajb).expect("diagonally dominant");
+            let product = &z * &y_j;
+            // conditioning of random 3 × 3 matrices
+            prop_assert!((product - DMatrix::identity(3, 3)).norm() < 1e-8 * (1.0 + z.norm() * y_j.norm()));
+        }
+    }
+}

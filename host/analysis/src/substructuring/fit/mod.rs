@@ -16,7 +16,6 @@ mod assembly_aims;
 mod block;
 mod cell;
 mod chart;
-mod effect;
 mod factor;
 mod model;
 mod narrow;
@@ -24,9 +23,7 @@ mod noise;
 mod nuisance;
 mod outcome;
 mod problem;
-mod shift;
 mod solver;
-mod start;
 mod weight;
 
 pub use chart::Shape;
@@ -214,9 +211,9 @@ pub fn fit(
     options: &Options,
 ) -> Result<Fitted, FitError> {
     let problem = problem(a, b, ajb, geometry, idms, band, options)?;
-    let chart = start::chart(&problem);
+    let chart = model::chart(&problem);
     let mut best: Option<solver::Found> = None;
-    for candidate in start::candidates(&problem, &chart, idms) {
+    for candidate in model::candidates(&problem, &chart, idms) {
         let found = match solver::search(&problem, &chart, &candidate) {
             Ok(found) => found,
             // another start may succeed

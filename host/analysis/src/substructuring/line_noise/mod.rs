@@ -7,9 +7,8 @@
 //! if P or Q is inverted by least squares and the data do not fit (Golub and Pereyra's derivative
 //! of A⁺). Noise is independent between cells, and real and imaginary part have the variance v
 //! each: then var K = Σ |(1 + iτ) g + (1 − iτ) h*|² v with τ = σ/ω, and ω² var C = Σ |g − h*|² v.
-
-mod dyads;
-mod over_band;
+//!
+//! The noise of a method's lines over a band.
 
 use super::coupling::boolean_difference;
 use super::decoupling::{
@@ -18,14 +17,18 @@ use super::decoupling::{
 use super::idm::Dof;
 use super::interface_data::balance;
 use super::internal_dofs::Rearrangement;
+use super::joint_over_bands::median;
 use super::method::Method;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
 use super::reduced::{Kind, Reduced, RefusedReason, every_line};
 use super::rooms::{Rooms, Side};
+use crate::band::Band;
 use dyads::{ASSEMBLED, Both, Dyads, Source, own};
 use nalgebra::{Complex, DMatrix};
 use std::collections::BTreeMap;
+
+mod dyads;
 
 type Line = DMatrix<Complex<f64>>;
 
@@ -233,5 +236,22 @@ impl<'a> Sources<'a> {
             m,
             signs,
         }
+    }
+}
+
+impl LineNoise {
+    /// Median of the translations' stiffness noise over the lines of a band, N/m; `frequency_hz`
+    /// are the lines, Hz. Directions without a known value are left out.
+    pub fn stiffness_over(&self, frequency_hz: &[f64], band: Band) -> BTreeMap<Dof, f64> {
+        let translations = self.stiffness_n_per_m.iter().filter(|(dof, _)| dof.is_translation());
+        translations
+            .filter_map(|(dof, of_k)| {
+                let inside: Vec<f64> = (frequency_hz.iter().zip(of_k))
+                    .filter(|(f, v)| band.contains(**f) && v.is_finite())
+                    .map(|(_, v)| *v)
+                    .collect();
+                (!inside.is_empty()).then(|| (*dof, median(&inside)))
+            })
+            .collect()
     }
 }

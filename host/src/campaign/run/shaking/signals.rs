@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::campaign::plan::level::Level;
 use crate::campaign::store::record_row::Samples;
 use crate::device::channels::ChannelMap;
-use crate::hysteresis::delays::in_step;
+use crate::hysteresis::record::in_step;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 
 /// Why a level's channels do not yield a hysteresis record.
