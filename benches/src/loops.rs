@@ -6,7 +6,7 @@ use super::peers::{self, Peers};
 use super::row::{RUNS, Row, quickest};
 use jointrig::campaign::plan::level::{Held, Level};
 use jointrig::campaign::run::shaking::record;
-use jointrig::campaign::store::record_row::Samples;
+use jointrig::campaign::store::record_table::Samples;
 use jointrig::device::channels::ChannelMap;
 use jointrig::hysteresis::{Correction, LoopAnalysis, analyse_both};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};

@@ -5,7 +5,7 @@
 //! docs/performance.md. Without `JOINTRIG_PYTHON` the peers' columns stay empty. It prints the
 //! table and then fails if something is slower than its target.
 
-use jointrig::cli::memory::expect_signals;
+use jointrig::cli::expect_signals;
 use jointrig_benches::peers::Peers;
 use jointrig_benches::{campaign, frames, loops, row, simulator, spectra, substructuring, universal};
 use std::error::Error;

@@ -1,7 +1,7 @@
 //! Growth of time and memory with the size of the work. A separate program, because counting heap
 //! use slows every allocation down.
 
-use jointrig::cli::memory::expect_signals;
+use jointrig::cli::expect_signals;
 use jointrig_benches::growth::{Growth, table};
 use jointrig_benches::{campaign, substructuring};
 use peak_alloc::PeakAlloc;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use jointrig::analyse::{self, AnalyseError, CampaignFile, KnownContact, Wanted};
 use jointrig::campaign::plan::{configuration_named, structure};
-use jointrig::campaign::run::status;
+use jointrig::campaign::run::progress;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::error::StoreError;
 use jointrig::report;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use jointrig::campaign::plan::{Cell, configuration_name};
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::error::StoreError;
-use jointrig::campaign::store::record_row::RecordRow;
+use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::channels::ChannelMap;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;

@@ -1,16 +1,24 @@
 //! Reads and averages the cells, one at a time on each thread, without keeping their signals.
+//!
+//! Spectra of single hits, for the bootstrap: only the assembly's interface cells, only the main
+//! band.
+//!
+//! Collects every hit's response per newton, by cell, to detect whether the contact slips under the
+//! hammer.
 
 use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
-use super::cell::{Cell, CellName, Measurements};
-use super::contact_answer;
-use super::hammer_slip::{self, HitAtContact};
-use super::hit_spectra;
-use super::impact_loops::{self, ImpactLoop};
+use super::cell::{Cell, CellName, Hit, Measurements};
+use super::impact_loops::ImpactLoop;
 use super::missing::Missing;
-use super::wanted::Progress;
+use super::question::Progress;
+use super::{contact_stage, impact_loops};
+use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSignals};
+use crate::results::MAIN_BAND;
+use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
 use crate::structure::Structure;
 use crate::substructuring::averaged::CellHits;
-use crate::substructuring::geometry::{Geometry, Grouping};
+use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
+use num_complex::Complex;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -61,7 +69,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     let records = |told: String| Missing::Records { cell: name.clone(), told };
     let geometry = measurements.geometry();
     let moves_contact = counts_for_contact(geometry, name);
-    let (drives, damped) = (drives_the_cells(geometry, name), contact_answer::reads(geometry, name));
+    let (drives, damped) = (drives_the_cells(geometry, name), contact_stage::reads(geometry, name));
     let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
     let mut sums: Option<CellSums> = None;
     let (mut unfit, mut kept) = (None, Cell::default());
@@ -73,7 +81,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
             CellSums::new(name.clone(), sigma_per_s, asked, LINES_HZ)
         });
         if let Some(signals) = hit.contact.as_ref().filter(|_| moves_contact && !hit.of_row) {
-            found.at_contact.extend(hammer_slip::of_hit(name, fs_hz, hit));
+            found.at_contact.extend(of_hit(name, fs_hz, hit));
             match impact_loops::of_hit(hit.record, &name.impact, fs_hz, signals, signals.delay_s) {
                 Ok(one) => found.loops.push(one),
                 Err(error) => {
@@ -96,7 +104,7 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     found.missing.splice(0..0, left_out.into_iter().map(records));
     let Some(sums) = sums else { return found };
     if keep_hits {
-        match hit_spectra::of(name, &geometry.ajb, &kept, sigma_per_s, quantity) {
+        match of(name, &geometry.ajb, &kept, sigma_per_s, quantity) {
             Ok(hits) => found.hits.extend(hits),
             Err(error) => found.missing.push(records(error.to_string())),
         }
@@ -124,4 +132,88 @@ fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {
 fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
     name.configuration == Structure::B
         && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)
+}
+
+/// The spectra of every hit of a cell of the assembly's interface; `None` for another cell, or for
+/// a single hit.
+///
+/// # Errors
+/// Hits that cannot be transformed.
+pub fn of(
+    name: &CellName,
+    points: &Configuration,
+    cell: &Cell,
+    sigma_per_s: f64,
+    quantity: MotionQuantity,
+) -> Result<Option<CellHits>, SpectraError> {
+    let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
+    let channels: Vec<&Point> =
+        points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
+    // records hold a location's channels in the order used here
+    let all = cell.hits.iter().all(|hit| hit.response.len() == channels.len());
+    let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
+    if name.configuration != Structure::Ajb || channels.is_empty() || !all || !there || cell.hits.len() < 2 {
+        return Ok(None);
+    }
+    let (mut auto, mut cross) = (Vec::<Vec<f64>>::new(), Vec::<Vec<Vec<Complex<f64>>>>::new());
+    for hit in &cell.hits {
+        let one = ImpactRecords {
+            fs_hz: cell.fs_hz,
+            force_n: vec![hit.force_n.clone()],
+            response: vec![hit.response.clone()],
+            quantity,
+        };
+        let settings = FrfSettings {
+            windowing: Windowing { sigma_per_s, ..Windowing::default() },
+            delay_s: hit.response_delay_s.clone(),
+            band_hz: Some([MAIN_BAND.low_hz, MAIN_BAND.high_hz]),
+            ..FrfSettings::default()
+        };
+        let y = estimate(&one, &[true], &settings)?;
+        auto.resize(y.lines(), Vec::new());
+        cross.resize(y.lines(), vec![Vec::new(); channels.len()]);
+        for l in 0..y.lines() {
+            auto[l].push(y.force(l));
+            for (axis, of_channel) in cross[l].iter_mut().enumerate() {
+                of_channel.push(y.cross(l, axis));
+            }
+        }
+    }
+    Ok(Some(CellHits {
+        input: name.impact.clone(),
+        outputs: channels.iter().map(|c| c.description.clone()).collect(),
+        auto,
+        cross,
+    }))
+}
+
+/// The response per newton of one hit that moves the contact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HitAtContact {
+    /// Its cell: hits of one cell share place, aim and direction.
+    pub cell: CellName,
+    /// T, v_A and v_B.
+    pub response: HitResponse,
+}
+
+/// From one hit; `None` if it lacks the contact's signals, or is too short.
+pub fn of_hit(cell: &CellName, fs_hz: f64, hit: &Hit) -> Option<HitAtContact> {
+    let signals = hit.contact.as_ref()?;
+    let delays = signals.delay_s;
+    let response = HitResponse::of(&HitSignals {
+        fs_hz,
+        hammer_n: &hit.force_n,
+        contact: [&signals.tangential_n, &signals.specimen_a_m_per_s, &signals.specimen_b_m_per_s],
+        delay_s: [delays.load_cells, delays.specimen_a, delays.specimen_b],
+    })?;
+    Some(HitAtContact { cell: cell.clone(), response })
+}
+
+/// The verdict from all hits; they must be ordered by cell.
+pub fn told(hits: &[HitAtContact]) -> HammerSlip {
+    let cells: Vec<CellHits<'_>> = hits
+        .chunk_by(|a, b| a.cell == b.cell)
+        .map(|own| CellHits { impact: &own[0].cell.impact, hits: own.iter().map(|h| &h.response).collect() })
+        .collect();
+    HammerSlip::of(&cells)
 }

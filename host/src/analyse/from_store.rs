@@ -1,12 +1,18 @@
 //! Access to a campaign file as measurements: records decoded, in SI units, one cell at a time,
 //! from any thread.
+//!
+//! Information in a campaign file about itself: provenance, and how much of the plan was measured.
+//!
+//! Numbers of kept and refused hits of a configuration.
+//!
+//! Errors of the analysis of a campaign file.
 
-use super::analyse_error::AnalyseError;
 use super::campaign::analyse_measurements;
 use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, ShakerLevel};
 use super::findings::Findings;
+use super::heard::Heard;
 use super::plan_geometry::{geometry, places};
-use super::wanted::{Progress, Wanted};
+use super::question::{Progress, Wanted};
 use crate::campaign::plan::{Plan, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
@@ -15,12 +21,13 @@ use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::frf_table::ImportedFrf;
 use crate::campaign::store::level_table::LevelRow;
-use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::{Rows, places as response_places};
 use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
+use crate::results::{Calibrated, CellRow, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;
@@ -512,6 +519,219 @@ fn response_quantity<'a>(
         [Quantity::Acceleration] => Ok(MotionQuantity::Acceleration),
         _ => Err(AnalyseError::Quantity(found.iter().map(|q| q.unit()).collect::<Vec<_>>().join(" and "))),
     }
+}
+
+impl CampaignFile {
+    /// Provenance of the findings: file, device, settings, link.
+    pub(super) fn source(&self, store: &Store) -> Result<Source, AnalyseError> {
+        let file = self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned();
+        let mut source = Source { file, kind: "campaign".into(), ..Source::default() };
+        source.started = self.records.values().flatten().flatten().map(|r| r.utc.clone()).min();
+        let sessions = store.sessions()?;
+        source.simulated = store.is_simulated()?;
+        if let Some((_, info)) = sessions.last() {
+            for (key, value) in [
+                ("address", info.address.clone()),
+                ("board", info.board.clone()),
+                ("serial", info.serial.clone()),
+                ("firmware_version", info.firmware_version.clone()),
+                ("target", info.target.clone()),
+                ("build", info.build.to_string()),
+                ("schema_hash", info.schema_hash.to_string()),
+                ("sessions", sessions.len().to_string()),
+            ] {
+                source.device.insert(key.into(), value);
+            }
+        }
+        let (text, plan_file) = store.plan_text()?;
+        source.settings.insert("plan".into(), self.plan.name.get_ref().clone().into());
+        source.settings.insert("plan_file".into(), plan_file.into());
+        source
+            .settings
+            .insert("plan_crc32".into(), format!("{:08x}", crc32fast::hash(text.as_bytes())).into());
+        source
+            .settings
+            .insert("virtual_point_m".into(), serde_json::json!(self.plan.geometry.virtual_point_m));
+        if let Some(names) = self.plan.own_names() {
+            source.settings.insert("structure".into(), names.into());
+        }
+        if !self.plan.slides_along_z() {
+            source.settings.insert("sliding_direction".into(), serde_json::json!(self.plan.sliding()));
+        }
+        // which simulated rig it was, and its random seed
+        if let Some(rig) = store.simulated_rig()? {
+            source.settings.insert("rig".into(), rig.name.into());
+            source.settings.insert("seed".into(), rig.seed.to_string().into());
+        } else if let Some(seed) = store.meta("demo_seed")? {
+            source.settings.insert("seed".into(), seed.into());
+        }
+        source.link = store.link_counters()?;
+        source.calibrations = calibrated(store)?;
+        source.structure_changes = store.structure_changes()?;
+        source.temperature_c = temperature_c(store)?;
+        Ok(source)
+    }
+
+    /// Every cell of the plan, in order, with its data quality.
+    pub(super) fn cell_rows(&self, heard: &Heard) -> Cells {
+        let rows = self.cells.iter().map(|cell| {
+            let count = self.tally.cell(cell.id);
+            let name = &cell.name;
+            let own = heard.cells.iter().find(|h| h.name == *name);
+            CellRow {
+                configuration: name.configuration.into(),
+                impact: name.impact.clone(),
+                response: name.response.clone(),
+                wanted: count.wanted as usize,
+                kept: count.kept as usize,
+                refused: count
+                    .refused
+                    .iter()
+                    .map(|(kind, n)| (kind.name().to_owned(), *n as usize))
+                    .collect(),
+                coherence: own.map_or_else(Vec::new, |h| h.coherence.clone()),
+                random_error: own.and_then(|h| h.random_error),
+            }
+        });
+        Cells { cells: rows.collect(), frequency_hz: heard.frequency_hz.clone() }
+    }
+
+    /// Every firing of the hammer with a readable record, in order.
+    pub(super) fn hit_rows(&self) -> Vec<HitRow> {
+        let mut rows: Vec<HitRow> = (self.records.values().flatten().flatten())
+            .map(|r| HitRow {
+                record: r.id,
+                peak_n: rounded(r.peak_n, 5),
+                pulse_us: r.pulse_us,
+                verdict: r.standing().name().into(),
+                kept: r.kept(),
+            })
+            .collect();
+        rows.sort_by_key(|row| row.record);
+        rows
+    }
+
+    /// How much of the plan was measured, by structure.
+    pub(super) fn completeness(&self) -> Vec<Completeness> {
+        let mut names: Vec<Structure> = Vec::new();
+        for cell in &self.cells {
+            if !names.contains(&cell.name.configuration) {
+                names.push(cell.name.configuration);
+            }
+        }
+        names
+            .into_iter()
+            .map(|name| {
+                let own = self.cells.iter().filter(|c| c.name.configuration == name).map(|cell| {
+                    let count = self.tally.cell(cell.id);
+                    let refused = count.refused.iter().map(|(kind, n)| (kind.name(), *n as usize)).collect();
+                    let hits = (count.wanted as usize, count.kept as usize, refused);
+                    (cell.lead.is_none(), hits)
+                });
+                completeness(name.name(), own)
+            })
+            .collect()
+    }
+}
+
+/// Minimum, mean and maximum temperature, °C; `None` without measurements.
+fn temperature_c(store: &Store) -> Result<Option<[f64; 3]>, AnalyseError> {
+    let all: Vec<f64> = store.temperatures()?.iter().map(|row| row.celsius).collect();
+    let (least, most) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), celsius| {
+        (least.min(*celsius), most.max(*celsius))
+    });
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    Ok((!all.is_empty()).then(|| [least, mean, most].map(|celsius| rounded(celsius, 4))))
+}
+
+/// The change made by every calibration, in the order of entry, relative to the first session to
+/// which it applies.
+fn calibrated(store: &Store) -> Result<Vec<Calibrated>, AnalyseError> {
+    let (sessions, all) = (store.sessions()?, store.calibrations()?);
+    let mut rows = Vec::new();
+    for (n, own) in all.iter().enumerate() {
+        // a calibration that applies from a session which never took place changed nothing
+        let Some((session, _)) = sessions.iter().find(|(id, _)| *id >= own.from_session) else { continue };
+        let map = store.channels_as_measured(*session)?;
+        let Some(channel) = map.channels.iter().find(|channel| channel.name == own.channel.as_str()) else {
+            continue;
+        };
+        let mut before = channel.clone();
+        let earlier =
+            all[..n].iter().filter(|old| old.channel == own.channel && old.from_session <= *session);
+        earlier.for_each(|old| old.apply(&mut before));
+        let mut now = before.clone();
+        own.apply(&mut now);
+        let sensor = [own.model.clone(), own.serial.clone(), own.calibrated.clone()];
+        rows.push(Calibrated {
+            utc: own.utc.clone(),
+            from_session: own.from_session,
+            channel: own.channel.clone(),
+            unit: channel.quantity.unit().into(),
+            sensitivity_v: [&before, &now].map(|c| rounded(1.0 / f64::from(c.units_per_volt), 7)),
+            delay_s: [&before, &now].map(|c| 1e-9 * f64::from(c.delay_ns)),
+            uncertainty: own.uncertainty,
+            sensor: sensor.into_iter().flatten().collect(),
+            reason: own.reason.clone(),
+        });
+    }
+    Ok(rows)
+}
+
+/// From counts per cell: whether the cell is struck itself rather than filled by the hits of
+/// another, and (planned, kept, refused by verdict).
+pub fn completeness<'a>(
+    name: &str,
+    cells: impl IntoIterator<Item = (bool, (usize, usize, Vec<(&'a str, usize)>))>,
+) -> Completeness {
+    let mut sum = Completeness { configuration: name.into(), ..Completeness::default() };
+    for (struck, (wanted, kept, refused)) in cells {
+        sum.cells += 1;
+        sum.cells_complete += usize::from(kept >= wanted);
+        if !struck {
+            continue;
+        }
+        sum.wanted += wanted;
+        sum.kept += kept;
+        for (verdict, count) in refused {
+            *sum.refused.entry(verdict.to_owned()).or_default() += count;
+        }
+    }
+    sum
+}
+
+/// Why a campaign file cannot be analysed, or one of its cells cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum AnalyseError {
+    /// The file cannot be read, or a record is damaged.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A channel that is required for analysing an impact is missing.
+    #[error("record {record}: its session has no channel for {role}")]
+    NoChannel {
+        /// The record.
+        record: i64,
+        /// The missing channel.
+        role: &'static str,
+    },
+    /// One cell has records of two sampling rates.
+    #[error(
+        "record {record} was sampled at {rate_hz} Hz, those before it at {others_hz} Hz: their spectra have other lines; refuse one or the other and measure again"
+    )]
+    Rate {
+        /// The record.
+        record: i64,
+        /// Its rate, Hz.
+        rate_hz: f64,
+        /// Rate of the earlier records, Hz.
+        others_hz: f64,
+    },
+    /// The response channels of the file's sessions measure different quantities, or a quantity
+    /// that is not motion.
+    #[error(
+        "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
+    )]
+    Quantity(String),
 }
 
 #[cfg(test)]

@@ -17,14 +17,14 @@ use super::store::Store;
 use super::store::calibration_table::Calibration;
 use super::store::error::StoreError;
 use super::store::level_table::LevelRow;
-use super::store::overrules::Overrule;
-use super::store::record_row::{RecordRow, Samples};
+use super::store::record_table::Overrule;
+use super::store::record_table::{RecordRow, Samples};
 use super::store::session_table::SessionInfo;
 use super::verdict::judge::{ByRecord, Judge};
 use super::verdict::others::Others;
 use super::verdict::{Kind, Verdict};
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use crate::device::stream::Recording;
 
 /// Relative difference below which numbers are equal: another machine's sine may differ in the last
 /// digit.

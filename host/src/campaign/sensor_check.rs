@@ -22,7 +22,7 @@ use jointrig_protocol::request::Configuration;
 use super::plan::{ImpactPoint, Plan, ResponsePoint};
 use super::store::Store;
 use super::store::error::StoreError;
-use super::store::record_row::RecordRow;
+use super::store::record_table::RecordRow;
 use crate::device::channels::ChannelMap;
 use crate::spectra::Pulse;
 

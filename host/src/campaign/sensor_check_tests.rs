@@ -1,11 +1,11 @@
+use super::store::record_table::NewRecord;
 use super::*;
 use crate::campaign::plan::SMALL;
 use crate::campaign::store::notes::utc_now;
-use crate::campaign::store::record_row::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
-use crate::device::recording::Recording;
+use crate::device::stream::Recording;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::shot::{Phase, Shot};
 use std::f64::consts::PI;

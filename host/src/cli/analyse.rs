@@ -1,17 +1,19 @@
 //! `analyse`: results and report from a campaign file alone.
-
-use std::path::{Path, PathBuf};
-
-use clap::Args;
+//!
+//! `compare`: compares two campaigns.
+//!
+//! `report`: writes every figure and table of a campaign file.
 
 use super::error::CliError;
-use super::number::{not_negative, positive};
 use super::output;
-use super::waiting::Waiting;
+use super::output::{Waiting, not_negative, positive};
 use crate::analyse::{KnownContact, Wanted};
 use crate::campaign::store::Store;
-use crate::report::{self, words};
+use crate::report;
+use crate::report::{Format, words};
 use crate::results::Results;
+use clap::Args;
+use std::path::{Path, PathBuf};
 
 /// Analyse a campaign file: results.json and report.html.
 #[derive(Debug, Args)]
@@ -109,4 +111,67 @@ pub fn write_into(results: &Results, folder: &Path, formats: &[report::Format]) 
         doing: "writing results and report",
         source,
     })
+}
+
+/// Compare two campaigns: before and after wear, or under two loads. Writes compare.json and
+/// compare.html.
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// The first campaign file.
+    #[arg(value_name = "A.jrig")]
+    a: PathBuf,
+    /// The second campaign file.
+    #[arg(value_name = "B.jrig")]
+    b: PathBuf,
+    /// Folder for compare.json and compare.html.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Print compare.json on stdout too.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Compare {
+    pub fn run(self) -> Result<(), CliError> {
+        let a = analysed(&Store::open_read_only(&self.a)?, Wanted::default())?;
+        let b = analysed(&Store::open_read_only(&self.b)?, Wanted::default())?;
+        let compared = report::compare(&a, &b);
+        report::write_comparison(&compared, [&a, &b], &self.out).map_err(|source| CliError::File {
+            path: self.out.clone(),
+            doing: "writing the comparison",
+            source,
+        })?;
+        if self.json {
+            return output::json(&compared);
+        }
+        output::lines([
+            report::words::brief::on_what(&a),
+            report::words::brief::on_what(&b),
+            compared.verdict.clone(),
+            format!("Open {} for differences and figures.", self.out.join(report::COMPARISON_FILE).display()),
+        ])
+    }
+}
+
+/// Write the report of a campaign file: results.json, report.html, and optionally each figure as a
+/// separate file.
+#[derive(Debug, Args)]
+pub struct Report {
+    /// The campaign file.
+    #[arg(value_name = "FILE.jrig")]
+    file: PathBuf,
+    /// Folder for results.json, report.html and figures/.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Also write each figure as figures/NAME, in these formats.
+    #[arg(long, value_name = "FORMAT", value_delimiter = ',')]
+    figures: Vec<Format>,
+}
+
+impl Report {
+    pub fn run(self) -> Result<(), CliError> {
+        let store = Store::open_read_only(&self.file)?;
+        let found = analyse_into(&store, Wanted::default(), &self.out, &self.figures)?;
+        ending(&found, &self.out)
+    }
 }

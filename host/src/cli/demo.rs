@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::analyse::analyse_into;
 use super::error::CliError;
-use super::{interrupt, measure, output};
+use super::{measure, output};
 use crate::advice::quoted;
 use crate::analyse::Wanted;
 use crate::campaign::plan;
@@ -52,7 +52,7 @@ impl Demo {
         })?;
         let file = folder.join("campaign.jrig");
         let store = self.open(&file)?;
-        let stop = interrupt::flag();
+        let stop = output::flag();
         let mut onlooker = self.page.start(Some(&file), &stop, false)?;
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::error::CliError;
-use super::number::{not_negative, positive};
 use super::output;
+use super::output::{not_negative, positive};
 use crate::analyse::{Findings, RecordLoops};
 use crate::exchange::{is_beside_the_contact, read_hysteresis};
 use crate::hysteresis::{Correction, HysteresisRecord, analyse};

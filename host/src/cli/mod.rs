@@ -2,15 +2,28 @@
 //!
 //! `--json` prints exactly one document to stdout and nothing else; progress, prompts and messages
 //! go to stderr. An error is one to a few lines: what failed, where, what to do.
+//!
+//! `analyse-for-page`: started by the live page's process to analyse a campaign in a separate
+//! process. Hidden, since users do not call it.
+//!
+//! `completions`: prints a shell's completion script.
+//!
+//! `man`: prints the manual page, or writes one for each command.
+//!
+//! Tunes the system's allocator for short-lived signals and matrices.
+
+use crate::live::forming::analyse_for_another;
+use crate::outside::{tell_line, visible};
+use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use error::CliError;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
 
 mod analyse;
-#[cfg(feature = "dashboard")]
-mod analyse_for_page;
 mod campaign;
-mod compare;
-mod completions;
 mod demo;
-mod devices;
 mod error;
 mod export;
 mod frf;
@@ -20,29 +33,13 @@ mod hysteresis;
 mod identify;
 mod import;
 mod info;
-mod interrupt;
-mod man;
 mod measure;
-pub mod memory;
-mod number;
-#[cfg(feature = "dashboard")]
-mod open_page;
 mod output;
 mod page;
 mod plan;
-mod report;
 #[cfg(feature = "dashboard")]
 mod serve;
 mod shaker;
-mod waiting;
-
-use std::io::Write;
-use std::process::ExitCode;
-
-use clap::{ArgAction, Parser, Subcommand};
-
-use crate::outside::tell_line;
-use crate::outside::visible;
 
 /// Stiffness of a friction joint, measured: impact campaigns, FRFs, substructuring, hysteresis.
 #[derive(Debug, Parser)]
@@ -60,7 +57,7 @@ enum Command {
     /// The complete workflow on the built-in simulator: campaign, analysis, report.
     Demo(demo::Demo),
     /// List connected devices.
-    Devices(devices::Devices),
+    Devices(info::Devices),
     /// Show a device: handshake, channels, firmware version, counters.
     Info(info::Info),
     /// Impact campaigns.
@@ -72,16 +69,16 @@ enum Command {
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
     /// Write the report of a campaign file, and its figures as files.
-    Report(report::Report),
+    Report(analyse::Report),
     /// Show a campaign in the browser.
     #[cfg(feature = "dashboard")]
     Serve(serve::Serve),
     /// Analyse a campaign for the live page of another process.
     #[cfg(feature = "dashboard")]
     #[command(name = crate::live::forming::COMMAND, hide = true)]
-    AnalyseForPage(analyse_for_page::AnalyseForPage),
+    AnalyseForPage(AnalyseForPage),
     /// Compare two campaigns.
-    Compare(compare::Compare),
+    Compare(analyse::Compare),
     /// Write everything that a campaign file contains in formats for other programs.
     Export(export::Export),
     /// Compute FRFs from any impact records.
@@ -93,16 +90,16 @@ enum Command {
     /// Identify a joint from any FRFs.
     Identify(identify::Identify),
     /// Print completions for a shell.
-    Completions(completions::Completions),
+    Completions(Completions),
     /// Print the manual page, or write one for each command.
-    Man(man::Man),
+    Man(Man),
 }
 
 /// Parses the command line, runs the command, and returns the exit code.
 pub fn main() -> ExitCode {
     // clap prints help and usage errors itself, and exits with 0 and 2
     let cli = Cli::parse();
-    memory::expect_signals();
+    expect_signals();
     start_log(cli.verbose);
     match cli.run() {
         Ok(()) => ExitCode::SUCCESS,
@@ -164,6 +161,76 @@ fn start_log(verbose: u8) {
         writeln!(to, "[{time} {level:<5} {from}] {}", visible(&record.args().to_string()))
     });
     builder.init();
+}
+
+/// Print the result of an analysis, for the live page; ends when the input is closed.
+#[derive(Debug, Args)]
+pub struct AnalyseForPage {
+    /// The campaign file.
+    file: PathBuf,
+    /// The newest record's id.
+    last: i64,
+}
+
+impl AnalyseForPage {
+    pub fn run(self) -> Result<(), CliError> {
+        analyse_for_another(&self.file, self.last, &mut std::io::stdout().lock()).map_err(|source| {
+            CliError::File { path: self.file, doing: "analysing for the live page", source }
+        })
+    }
+}
+
+/// Print completions for a shell.
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// The shell.
+    shell: Shell,
+}
+
+impl Completions {
+    pub fn run(self) {
+        let mut text = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "jointrig", &mut text);
+        // a closed pipe is no error: the shell has read enough
+        drop(std::io::stdout().write_all(&text));
+    }
+}
+
+/// Print the manual page, or write it and one for each command into a folder.
+#[derive(Debug, Args)]
+pub struct Man {
+    /// Folder for jointrig.1, jointrig-analyse.1 and so on; created if it does not exist.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Man {
+    pub fn run(self) -> Result<(), CliError> {
+        let command = Cli::command();
+        let Some(folder) = self.out else {
+            let mut text = Vec::new();
+            let rendered = clap_mangen::Man::new(command).render(&mut text);
+            rendered.map_err(|error| CliError::Bad(format!("the manual page: {error}")))?;
+            // a closed pipe is no error: the pager has read enough
+            drop(std::io::stdout().write_all(&text));
+            return Ok(());
+        };
+        let written =
+            std::fs::create_dir_all(&folder).and_then(|()| clap_mangen::generate_to(command, &folder));
+        written.map_err(|source| CliError::File { path: folder, doing: "writing the manual pages", source })
+    }
+}
+
+/// Half of the total size of the signals of several records, or of the matrices of one step of the
+/// fit, bytes. A larger value would keep more memory idle than an analysis gains from it.
+const BLOCK_BYTES: usize = 7 << 20;
+
+/// glibc returns memory to the system when twice the size of the largest block freed so far is
+/// idle, so each record's signals would be paged in again, which takes a tenth of an analysis.
+/// Freeing this block raises that threshold (`mallopt(3)`, dynamic threshold); other allocators are
+/// not affected.
+pub fn expect_signals() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(BLOCK_BYTES)));
 }
 
 #[cfg(test)]

@@ -1,13 +1,22 @@
 //! Printing on stdout: one JSON document, or lines of text; a closed pipe is no error.
-
-use std::fmt::Display;
-use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
-
-use serde::Serialize;
+//!
+//! Numbers on the command line.
+//!
+//! Progress of a long task: a bar on a terminal, otherwise a line every ten seconds, so that a log
+//! shows that work continues.
+//!
+//! Ctrl-C: the first one ends the work after the current shot, the second one ends the program.
 
 use super::error::CliError;
-use crate::outside::{printed_json, visible};
+use crate::campaign::run::progress::Pace;
+use crate::outside::{printed_json, tell_line, visible};
+use indicatif::{ProgressBar, ProgressDrawTarget};
+use serde::Serialize;
+use std::fmt::Display;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Prints one JSON document.
 pub fn json<T: Serialize>(value: &T) -> Result<(), CliError> {
@@ -33,4 +42,91 @@ fn print(lines: impl IntoIterator<Item = impl Display>) -> Result<(), CliError> 
         }
     }
     Ok(())
+}
+
+/// A finite number over 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("write a number over 0".into()),
+    }
+}
+
+/// A finite number of 0 or more.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value >= 0.0 && value.is_finite() => Ok(value),
+        _ => Err("write a number that is not negative".into()),
+    }
+}
+
+/// Progress of a task.
+pub struct Waiting {
+    what: &'static str,
+    bar: ProgressBar,
+    /// `None` on a terminal.
+    pace: Option<Pace>,
+}
+
+impl Waiting {
+    /// Starts the display for `what`, such as "analysing".
+    pub fn of(what: &'static str) -> Self {
+        if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
+            Self { what, bar, pace: None }
+        } else {
+            Self { what, bar: ProgressBar::hidden(), pace: Some(Pace::default()) }
+        }
+    }
+
+    /// Reports that `done` of `total` parts are done.
+    pub fn at(&self, done: usize, total: usize) {
+        self.bar.set_length(total as u64);
+        self.bar.set_position(done as u64);
+        if self.pace.as_ref().is_some_and(Pace::is_due) {
+            tell_line!("{}: {done} of {total}", self.what);
+        }
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Returns a flag that Ctrl-C (or a termination signal) sets.
+pub fn flag() -> Arc<AtomicBool> {
+    let stop = Arc::default();
+    catch(&stop);
+    stop
+}
+
+/// Makes Ctrl-C (or a termination signal) set this flag.
+pub fn catch(stop: &Arc<AtomicBool>) {
+    let raised = stop.clone();
+    let set = ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            // everything accepted is already in the file
+            std::process::exit(1);
+        }
+        tell_line!("\nstopping after the shot in hand; Ctrl-C again ends at once");
+    });
+    if let Err(error) = set {
+        log::warn!("Ctrl-C cannot be caught ({error}): it will end the program at once");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signs_and_what_is_no_number_are_refused() {
+        assert_eq!((positive("1e-7"), not_negative("0")), (Ok(1e-7), Ok(0.0)));
+        for wrong in ["0", "-1", "nan", "inf", "x", ""] {
+            assert!(positive(wrong).is_err(), "{wrong}");
+            assert!(not_negative(wrong).is_err() || wrong == "0", "{wrong}");
+        }
+    }
 }

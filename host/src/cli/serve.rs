@@ -9,10 +9,10 @@ use clap::Args;
 
 use super::campaign::run::Run;
 use super::error::CliError;
-use super::open_page::Opened;
+use super::output;
+use super::page::Opened;
 use super::page::Page;
-use super::{interrupt, output};
-use crate::campaign::store::simulated::is_simulated_board;
+use crate::campaign::store::is_simulated_board;
 use crate::campaign::watch::Seen;
 use crate::dashboard::Dashboard;
 use crate::device::address::Address;
@@ -60,7 +60,7 @@ impl Serve {
 
 /// Shows a file, without a device.
 fn show(file: &Path, page: Page) -> Result<(), CliError> {
-    let stop = interrupt::flag();
+    let stop = output::flag();
     let dashboard = Dashboard::of_file(file, page.serve.unwrap_or(0))?;
     output::lines([dashboard.url()])?;
     tell_line!(
@@ -76,7 +76,7 @@ fn show(file: &Path, page: Page) -> Result<(), CliError> {
 /// Shows a device, without a file: its stream is started and displayed.
 fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     let address: Address = device.parse()?;
-    let stop = interrupt::flag();
+    let stop = output::flag();
     let mut onlooker = page.start(None, &stop, false)?;
     let mut session = Session::open(address.open(0)?, &address.to_string())?;
     session.look_for_log_tables(Tables::new(None));

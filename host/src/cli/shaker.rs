@@ -8,8 +8,8 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::error::CliError;
-use super::number::positive;
-use super::{interrupt, output};
+use super::output;
+use super::output::positive;
 use crate::advice;
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::{Held, Level, Moment};
@@ -108,7 +108,7 @@ impl Shaker {
         if info.drive_v > 0.0 && !info.stage {
             prompt(self.yes, levels.len())?;
         }
-        interrupt::catch(&stop);
+        output::catch(&stop);
         tell_line!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
         let options = Options {
             levels,

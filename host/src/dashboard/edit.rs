@@ -17,9 +17,9 @@ use serde_json::json;
 use tokio::sync::oneshot;
 
 use super::Shared;
-use super::problem::Problem;
+use super::routes::Problem;
 use crate::campaign::run::answers::{Answerer, Key, Question};
-use crate::campaign::run::edits::{Desk, Edit, NotTaken};
+use crate::campaign::run::answers::{Desk, Edit, NotTaken};
 use crate::campaign::verdict::Kind;
 use crate::live::message::Message;
 use crate::live::now::{Control, Doing};

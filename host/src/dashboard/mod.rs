@@ -9,10 +9,8 @@
 mod edit;
 mod guard;
 mod page;
-mod problem;
 mod routes;
 mod server;
-mod socket;
 
 use std::io;
 use std::net::SocketAddr;
@@ -23,7 +21,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::campaign::run::answers::{Answers, answers};
-use crate::campaign::run::edits::{Edits, edits};
+use crate::campaign::run::answers::{Edits, edits};
 use crate::campaign::store::error::StoreError;
 use crate::device::tap::{Tap, View, tap};
 use crate::live::averaging::Averages;

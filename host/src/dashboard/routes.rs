@@ -1,7 +1,15 @@
 //! Routes of the server and their handlers.
+//!
+//! Error responses: what is wrong, where, and what to do.
 
-use std::sync::Arc;
-
+use super::guard::{Refusal, from_here, token};
+use super::{Shared, edit, page, server};
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::live::numbers::drawn;
+use crate::live::{figures, numbers};
+use crate::report::figure;
+use crate::report::figure::Figure;
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
@@ -10,15 +18,7 @@ use axum::routing::get;
 use axum::{Json, Router};
 use serde::Deserialize;
 use serde_json::json;
-
-use super::guard::{Refusal, from_here, token};
-use super::problem::Problem;
-use super::{Shared, edit, page, socket};
-use crate::campaign::store::Store;
-use crate::campaign::store::error::StoreError;
-use crate::live::found::drawn;
-use crate::live::{figures, numbers, spectra_figures};
-use crate::report::figure::{self, Figure};
+use std::sync::Arc;
 
 /// Permissions of our page: run our script, use our style sheet, and send requests to this server.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; \
@@ -50,7 +50,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
             "/live.js",
             get(async || ([(header::CONTENT_TYPE, "text/javascript; charset=utf-8")], page::script())),
         )
-        .route("/socket", get(socket::socket))
+        .route("/socket", get(server::socket))
         .merge(data)
         .merge(edits)
         .fallback(async || Problem::missing("there is no such page"))
@@ -160,8 +160,8 @@ fn one(shared: &Shared, of: &str, id: i64, name: &str) -> Result<Option<Figure>,
     let (figure, record) = match (of, name) {
         ("records", "hit") => (figures::hit(&store, id)?, Some(id)),
         ("records", "channels") => (figures::channels(&store, id)?, Some(id)),
-        ("records", "force") => (spectra_figures::force(&store, id)?, Some(id)),
-        ("cells", "frf") => (spectra_figures::frf(&shared.averages, &store, id)?, None),
+        ("records", "force") => (figures::force(&store, id)?, Some(id)),
+        ("cells", "frf") => (figures::frf(&shared.averages, &store, id)?, None),
         ("cells", "hits") => (figures::cell(&store, id)?, None),
         ("cells", "place") => (figures::place(&store, id)?, None),
         _ => {
@@ -211,4 +211,44 @@ async fn log(State(shared): State<Arc<Shared>>, Query(asked): Query<After>) -> R
     let lines: Vec<_> =
         lines.iter().map(|(id, utc, text)| json!({ "id": id, "utc": utc, "text": text })).collect();
     Ok(Json(lines).into_response())
+}
+
+/// Why a request could not be answered.
+pub struct Problem {
+    status: StatusCode,
+    what: String,
+    todo: &'static str,
+}
+
+impl Problem {
+    /// A problem with this status.
+    pub fn new(status: StatusCode, what: impl Into<String>, todo: &'static str) -> Self {
+        Self { status, what: what.into(), todo }
+    }
+
+    /// A problem with status 404, not found.
+    pub fn missing(what: &str) -> Self {
+        Self::new(StatusCode::NOT_FOUND, what, "go back to the page")
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        let [what, todo] = refusal.words();
+        Self::new(refusal.status(), what, todo)
+    }
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        Self::new(StatusCode::NOT_FOUND, error.to_string(), "look at the campaign file")
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body =
+            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
+        (self.status, Json(body)).into_response()
+    }
 }

@@ -8,13 +8,30 @@
 //! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, with the built-in rig |
 //! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one, or by serial |
 //! | `replay:` | known, but not supported by this version |
-
-use std::fmt;
-use std::path::PathBuf;
-use std::str::FromStr;
+//!
+//! Byte transport to and from a device.
+//!
+//! `tcp:HOST:PORT`: a device connected by a socket (a virtual board, or a bridge).
+//!
+//! `sim:` and `sim:RIG.toml`: the simulated rig in this process.
+//!
+//! The only place where the host depends on the simulator; it receives bytes as from any device. It
+//! also receives the values that an ideal measurement would find for the rig's parameters. They go
+//! into the campaign file, and no estimator reads them.
 
 use super::error::DeviceError;
-use super::transport::Transport;
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use jointrig_hil_sim::board::{Options, VirtualBoard};
+use jointrig_hil_sim::link::HostEnd;
+use jointrig_hil_sim::rig::RigConfig;
+use sha2::{Digest, Sha256};
+use std::io::{Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Duration;
+use std::{fmt, io};
 
 /// The location of an instrument.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,7 +109,7 @@ impl Address {
             Self::Sim { rig } => open_sim(rig.as_deref(), seed),
             Self::Serial(path) => Ok(Box::new(super::serial::Serial::open(path)?)),
             Self::Usb { serial } => Ok(Box::new(super::usb::Usb::open(serial.as_deref())?)),
-            Self::Tcp(place) => Ok(Box::new(super::tcp::Tcp::open(place)?)),
+            Self::Tcp(place) => Ok(Box::new(Tcp::open(place)?)),
             Self::Qemu { image } => open_qemu(image.as_deref(), seed),
         }
     }
@@ -100,7 +117,7 @@ impl Address {
 
 #[cfg(feature = "sim")]
 fn open_sim(rig: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
-    Ok(Box::new(super::sim::Sim::open(rig, seed)?))
+    Ok(Box::new(Sim::open(rig, seed)?))
 }
 
 #[cfg(feature = "sim")]
@@ -122,6 +139,188 @@ fn open_sim(rig: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transpo
         given: Address::Sim { rig: rig.map(Into::into) }.to_string(),
         scheme: "sim".into(),
     })
+}
+
+/// A byte pipe to one device. It does not preserve frames: bytes may arrive in pieces of any size,
+/// and may be lost.
+pub trait Transport: Send {
+    /// Reads the available bytes into `buf`, waiting at most `timeout` for the first one.
+    ///
+    /// Returns the number of bytes read; 0 means that nothing arrived in time.
+    ///
+    /// # Errors
+    /// The device or its cable was disconnected.
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
+
+    /// Writes all of `bytes`.
+    ///
+    /// # Errors
+    /// The device or its cable was disconnected.
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Whether the device's packets arrive as they were sent. A device may then omit byte stuffing
+    /// ([`jointrig_protocol::packet`]).
+    fn keeps_packets(&self) -> bool {
+        false
+    }
+
+    /// The firmware image with which the device was started, where it is known; it contains the log
+    /// strings.
+    fn image(&self) -> Option<&Path> {
+        None
+    }
+
+    /// The rig's description when the device is simulated in this process; `None` for any other
+    /// device. It is taken from the rig's parameters and is not transmitted over the link.
+    fn simulated(&self) -> Option<Simulated> {
+        None
+    }
+}
+
+/// A device that is simulated in this process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulated {
+    /// The rig's name.
+    pub rig: String,
+    /// The seed of its scatter.
+    pub seed: u64,
+    /// SHA-256 of all its parameters, base64.
+    pub parameters: String,
+    /// What an ideal measurement of it would find, as JSON.
+    pub truth: serde_json::Value,
+}
+
+impl<T: Transport + ?Sized> Transport for Box<T> {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        (**self).read(buf, timeout)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).write_all(bytes)
+    }
+
+    fn keeps_packets(&self) -> bool {
+        (**self).keeps_packets()
+    }
+
+    fn image(&self) -> Option<&Path> {
+        (**self).image()
+    }
+
+    fn simulated(&self) -> Option<Simulated> {
+        (**self).simulated()
+    }
+}
+
+const CONNECT_PATIENCE: Duration = Duration::from_secs(3);
+
+/// An open socket.
+pub struct Tcp {
+    stream: TcpStream,
+    timeout: Option<Duration>,
+}
+
+impl Tcp {
+    /// Connects to `place`, given as `host:port`.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] with the cause and what to do.
+    pub fn open(place: &str) -> Result<Self, DeviceError> {
+        let open = |why: String| DeviceError::Open { address: format!("tcp:{place}"), why };
+        let mut last = None;
+        for address in place.to_socket_addrs().map_err(|error| open(error.to_string()))? {
+            match TcpStream::connect_timeout(&address, CONNECT_PATIENCE) {
+                Ok(stream) => {
+                    stream.set_nodelay(true).map_err(|error| open(error.to_string()))?;
+                    return Ok(Self { stream, timeout: None });
+                }
+                Err(error) => last = Some(error),
+            }
+        }
+        let why = last.map_or_else(|| "the name has no address".into(), |error| error.to_string());
+        Err(open(format!("{why}: is the device (or `jointrig-hil-sim serve --tcp`) running there?")))
+    }
+}
+
+impl Transport for Tcp {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        if self.timeout != Some(timeout) {
+            self.stream.set_read_timeout(Some(timeout))?;
+            self.timeout = Some(timeout);
+        }
+        match self.stream.read(buf) {
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+                ) =>
+            {
+                Ok(0)
+            }
+            other => other,
+        }
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.stream.write_all(bytes)
+    }
+}
+
+/// A running virtual board.
+pub struct Sim {
+    link: HostEnd,
+    simulated: Simulated,
+    // declared after the link, so that it is dropped after it: its thread then ends
+    _board: VirtualBoard,
+}
+
+impl Sim {
+    /// Starts the rig described in the file, or the built-in one.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] with the error in the description, and where.
+    pub fn open(rig: Option<&Path>, seed: u64) -> Result<Self, DeviceError> {
+        let address = || rig.map_or_else(|| "sim:".into(), |path| format!("sim:{}", path.display()));
+        let open = |why: String| DeviceError::Open { address: address(), why };
+        let text = match rig {
+            Some(path) => Some(crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|error| {
+                open(format!(
+                    "the rig's description {} cannot be read: {error}; {}",
+                    path.display(),
+                    crate::advice::reading(&error)
+                ))
+            })?),
+            None => None,
+        };
+        let config = text.map_or_else(|| Ok(RigConfig::default()), |text| RigConfig::from_toml(&text));
+        let config = config.map_err(|error| open(error.to_string()))?;
+        let options = Options { seed, ..Options::default() };
+        let (board, link) =
+            VirtualBoard::start_with(&config, &options).map_err(|error| open(error.to_string()))?;
+        let truth = serde_json::to_value(config.truth()).map_err(|error| open(error.to_string()))?;
+        let parameters = BASE64_STANDARD.encode(Sha256::digest(config.to_toml().as_bytes()));
+        let simulated = Simulated { rig: config.name, seed, parameters, truth };
+        Ok(Self { link, simulated, _board: board })
+    }
+}
+
+impl Transport for Sim {
+    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.link.read(buf, timeout)
+    }
+
+    fn keeps_packets(&self) -> bool {
+        true
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.link.write_all(bytes)
+    }
+
+    fn simulated(&self) -> Option<Simulated> {
+        Some(self.simulated.clone())
+    }
 }
 
 #[cfg(test)]

@@ -1,28 +1,21 @@
 //! Devices: addresses, byte transports, sessions, and the records cut from their streams.
 //!
-//! [`address::Address`] opens a [`transport::Transport`]; [`session::Session`] runs the protocol
-//! over it and assembles the stream of scans, whatever the link loses; [`recording::Recording`] is
+//! [`address::Address`] opens a [`address::Transport`]; [`session::Session`] runs the protocol
+//! over it and assembles the stream of scans, whatever the link loses; [`stream::Recording`] is
 //! one impact cut from it. A [`tap`] lets another thread view the stream.
 
 pub mod address;
 pub mod channels;
 mod claims;
 pub mod error;
-mod in_step;
 mod inbox;
 pub mod link;
 pub mod logs;
 #[cfg(feature = "sim")]
 mod qemu;
-pub mod recording;
 mod requests;
 mod serial;
 pub mod session;
-mod shaking;
-#[cfg(feature = "sim")]
-mod sim;
 pub mod stream;
 pub mod tap;
-mod tcp;
-pub mod transport;
 pub mod usb;

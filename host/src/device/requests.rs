@@ -1,13 +1,13 @@
 //! Requests of a session's user, and waiting for their results.
-
-use std::ops::Range;
-use std::time::{Duration, Instant};
-
-use jointrig_protocol::answer::{Answer, Info, Status};
-use jointrig_protocol::frame::Kind;
-use jointrig_protocol::limits::MAX_CHANNELS;
-use jointrig_protocol::request::{Fire, Numbered, Request, Stage, Trigger};
-use jointrig_protocol::slow::Slow;
+//!
+//! The shaker from the host's side: order, renewal and rest.
+//!
+//! An order is valid for a limited time of the device's clock and must be renewed by another
+//! [`Session::shake`]. A session that ends while the shaker may be moving orders it to rest. If the
+//! process is killed, the device does so itself after one second without a message.
+//!
+//! Synchronisation with another recorder: the clock that times the scans, and edges that both
+//! record.
 
 use super::channels::ChannelMap;
 use super::claims;
@@ -16,6 +16,15 @@ use super::inbox::Starting;
 use super::session::{Session, TRIES, patience};
 use super::stream::{Accounts, Stream};
 use super::tap::Tap;
+use jointrig_protocol::answer::{Answer, Info, Shaker, Status};
+use jointrig_protocol::event::{Event, Reason};
+use jointrig_protocol::frame::Kind;
+use jointrig_protocol::limits::MAX_CHANNELS;
+use jointrig_protocol::request::{Fire, Numbered, Request, Shake, Stage, Trigger};
+use jointrig_protocol::slow::Slow;
+use jointrig_protocol::sync::{Clock, ClockFault, Edge, Sync};
+use std::ops::Range;
+use std::time::{Duration, Instant};
 
 /// Minor protocol version that introduced scales.
 const SCALES_SINCE: u16 = 1;
@@ -346,5 +355,121 @@ impl Session {
             Answer::Staged { at_scan } => Ok(at_scan),
             other => Err(self.wrong("stage", &other)),
         }
+    }
+}
+
+impl Session {
+    /// Orders a sine, or renews or changes the current one.
+    ///
+    /// # Errors
+    /// The device refuses it (no shaker, open guard, out of bounds) or does not answer.
+    pub fn shake(&mut self, order: Shake) -> Result<(), DeviceError> {
+        // set before the answer: if the answer is lost, the shaker may be moving
+        self.shakes = true;
+        self.ask_done(Request::Shake(order))
+    }
+
+    /// Orders the shaker to rest, over a ramp. [`Session::shaker_rests`] reports when it is at
+    /// rest.
+    ///
+    /// # Errors
+    /// The device does not answer; the shaker then comes to rest by itself.
+    pub fn rest(&mut self) -> Result<(), DeviceError> {
+        self.ask_done(Request::Rest)?;
+        self.shakes = false;
+        Ok(())
+    }
+
+    /// Whether the shaker is at rest now.
+    ///
+    /// # Errors
+    /// The device does not answer.
+    pub fn shaker_rests(&mut self) -> Result<bool, DeviceError> {
+        Ok(self.status()?.shaker == Shaker::Resting)
+    }
+
+    /// Why the shaker stopped since the last call, if it did. Other events stay in the queue.
+    pub fn shaker_stopped(&mut self) -> Option<Reason> {
+        let mut reason = None;
+        self.inbox.events.retain(|numbered| match numbered.event {
+            Event::ShakerStops(why) => {
+                reason = Some(why);
+                false
+            }
+            Event::ShakerRuns | Event::ShakerRests => false,
+            _ => true,
+        });
+        reason
+    }
+
+    /// Orders the shaker to rest without waiting for an answer; called when a session ends.
+    pub(super) fn rest_at_last(&mut self) {
+        if self.shakes
+            && let Err(error) = self.background(Request::Rest)
+        {
+            log::warn!("{error}; the shaker comes to rest by itself, one second after the last word");
+        }
+    }
+}
+
+/// Minor protocol version that introduced clocks and edges.
+const SINCE: u16 = 2;
+/// Timeout for the check of a clock, which takes some ms of device time.
+const MEASURED_WITHIN: Duration = Duration::from_secs(5);
+
+impl Session {
+    /// Current clock and edges; `None` for a device without them (protocol 1.1 and before).
+    pub fn sync(&mut self) -> Result<Option<Sync>, DeviceError> {
+        if self.hello.minor < SINCE {
+            return Ok(None);
+        }
+        match self.ask(Request::Sync)? {
+            Answer::Sync(sync) => Ok(Some(sync)),
+            other => Err(self.wrong("sync", &other)),
+        }
+    }
+
+    /// Selects the clock for the scans of later streams, and waits until it was checked
+    /// successfully.
+    ///
+    /// # Errors
+    /// The check fails ([`DeviceError::Clock`] has the reason), the firmware is too old, or the
+    /// device has no sync port.
+    pub fn take_clock(&mut self, clock: Clock) -> Result<Sync, DeviceError> {
+        if self.hello.minor < SINCE {
+            return Err(DeviceError::TooOld {
+                address: self.address.clone(),
+                speaks: (self.hello.major, self.hello.minor),
+                needs: (self.hello.major, SINCE),
+                what: "take an external clock or tell of edges at its sync input, as the plan's [sync] asks",
+            });
+        }
+        self.ask_done(Request::Clock(clock))?;
+        let give_up = Instant::now() + MEASURED_WITHIN;
+        loop {
+            let fault = match self.sync()? {
+                Some(sync) if sync.clock == clock && sync.fault.is_none() => return Ok(sync),
+                Some(Sync { fault: Some(fault), .. }) => fault,
+                // another clock is in use
+                _ => return Err(self.nonsense("does not take the clock that it was told to take".into())),
+            };
+            if fault != ClockFault::Unproven || Instant::now() > give_up {
+                return Err(DeviceError::Clock { address: self.address.clone(), fault });
+            }
+        }
+    }
+
+    /// Emits one pulse at the sync output as soon as possible; its edge later appears in
+    /// [`Session::edges`].
+    ///
+    /// # Errors
+    /// No stream is running, or the device has no sync port.
+    pub fn pulse_output(&mut self) -> Result<(), DeviceError> {
+        self.ask_done(Request::Mark)
+    }
+
+    /// Edges at the sync input and output since the last call.
+    pub fn edges(&mut self) -> Vec<Edge> {
+        std::mem::take(&mut self.inbox.edges)
     }
 }

@@ -1,7 +1,7 @@
 //! npz, csv and xlsx: written files are read back, and damaged files are refused without a panic.
 
 use super::npz::NpzFile;
-use super::npz_output::NpzOutput;
+use super::npz::NpzOutput;
 use super::{read_frf, read_hysteresis, read_impacts, read_positions, write_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use num_complex::Complex;

@@ -2,7 +2,7 @@
 //! excitation), in the same order of hits as the file of force and response.
 
 use super::frf_uff::{FrfUffError, write_uff};
-use super::npz_output::NpzOutput;
+use super::npz::NpzOutput;
 use super::tables_output::{TableError, write_rows_of};
 use super::uff::{
     Abscissa, Axis, ByteOrder, DataSet, Dof, Encoding, Function, Header, Units, Values, kind, quantity,

@@ -4,11 +4,11 @@
 //! `unit` of the values, `unit_frequency`; and `output_direction`, `input_direction`: ±1, 2, 3
 //! along x, y, z, 0 where unknown.
 
-use super::direction::turned_words;
+use super::labelled_frf::turned_words;
 use super::labelled_frf::{Label, LabelledFrf};
+use super::npz::NpzError;
+use super::npz::NpzOutput;
 use super::npz::{Array, NpzFile};
-use super::npz_error::NpzError;
-use super::npz_output::NpzOutput;
 use super::units::{Dimension, StatedUnits, Unit};
 use crate::frf::{COHERENCE_ROUNDING, Frf, MotionQuantity};
 use nalgebra::DMatrix;

@@ -7,7 +7,7 @@
 //! labels and data set 164 give the units. The format has no field for the damping of an
 //! exponential window, so it is in text 4 as `sigma 2.3 1/s`.
 
-use super::direction::turned_words;
+use super::labelled_frf::turned_words;
 use super::labelled_frf::{Label, LabelledFrf};
 use super::uff::{
     Abscissa, Axis, Contents, DataSet, Dof, Encoding, Function, Values, WriteError, kind, quantity, read_only,

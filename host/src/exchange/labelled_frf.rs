@@ -1,9 +1,24 @@
 //! FRFs together with the labels of their file: the signed axes of each response and each force,
 //! and the units of the values.
+//!
+//! Signed directions of labels: ±1, 2, 3 along x, y, z. A value is along its label's signed
+//! direction; this module compares it with the direction that a plan or a geometry gives for the
+//! same point.
+//!
+//! Reads an FRF file of either format, npz or universal file. Its first bytes determine the format,
+//! not its name.
 
-use super::direction::{Beside, axis_name, beside, turned_words, vector_name};
+use super::frf_npz::read_labelled;
+use super::frf_uff::{FrfUffError, read_frf_uff};
+use super::npz::NpzError;
+use super::other_formats::{Contents, not_read_here};
+use super::units::StatedUnits;
 use crate::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
+use crate::{advice, foreign};
+use std::io;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 /// The label of an output or an input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -167,6 +182,140 @@ fn look(
             vector_name(point.direction)
         )),
     }
+}
+
+/// A label's direction for messages, such as `+z`; `None` where it is not along an axis.
+pub fn axis_name(direction: i64) -> Option<String> {
+    let axis = ["x", "y", "z"].get(usize::try_from(direction.unsigned_abs()).ok()?.checked_sub(1)?)?;
+    Some(format!("{}{axis}", if direction < 0 { '−' } else { '+' }))
+}
+
+/// A direction of a plan or a geometry for messages: `−z`, or its three numbers.
+pub fn vector_name(direction: [f64; 3]) -> String {
+    match along(direction) {
+        Some(axis) => axis_name(axis).unwrap_or_default(),
+        None => format!("({})", direction.map(|v| format!("{}", (v * 1e3).round() / 1e3)).join(", ")),
+    }
+}
+
+/// Least component with which a direction of three printed digits counts as along an axis.
+const ALONG: f64 = 0.999;
+
+/// ±1, 2, 3 where a unit vector is along an axis, else `None`.
+pub(super) fn along(direction: [f64; 3]) -> Option<i64> {
+    let found = (1..).zip(direction).find(|(_, part)| part.abs() > ALONG);
+    found.map(|(axis, part)| if part < 0.0 { -axis } else { axis })
+}
+
+/// How a label's direction relates to the direction of its point in a plan or a geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beside {
+    /// The same direction, or the label has none.
+    Same,
+    /// The opposite: the value changes its sign.
+    Opposite,
+    /// The point's direction is along no axis and makes an angle over 60° with the label's axis. A
+    /// label cannot express such a direction, so it must refer to the sensor's own axes.
+    Untold,
+    /// Another axis.
+    Other,
+}
+
+/// Compares a label's direction with that of its point.
+pub fn beside(label: i64, direction: [f64; 3]) -> Beside {
+    let Some(part) =
+        usize::try_from(label.unsigned_abs()).ok().and_then(|axis| direction.get(axis.checked_sub(1)?))
+    else {
+        return Beside::Same;
+    };
+    let part = if label < 0 { -part } else { *part };
+    match part {
+        0.5.. => Beside::Same,
+        ..=-0.5 => Beside::Opposite,
+        _ if along(direction).is_none() => Beside::Untold,
+        _ => Beside::Other,
+    }
+}
+
+/// `A1 along −z turned`; lists at most five names.
+pub(super) fn turned_words(turned: &[(String, i64)]) -> Option<String> {
+    let named = |(name, direction): &(String, i64)| match axis_name(*direction) {
+        Some(axis) => format!("{name} along {axis}"),
+        None => name.clone(),
+    };
+    let first: Vec<String> = turned.iter().take(5).map(named).collect();
+    let more = turned.len().saturating_sub(first.len());
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!first.is_empty()).then(|| format!("{}{more} turned", first.join(", ")))
+}
+
+/// As [`vector_name`], for several directions.
+pub(super) fn vector_names(all: &[[f64; 3]]) -> String {
+    all.iter().map(|axis| vector_name(*axis)).collect::<Vec<_>>().join(", ")
+}
+
+/// Why FRFs could not be read from a file.
+#[derive(Debug, thiserror::Error)]
+pub enum FrfFileError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+    /// The file has a known format that is not supported.
+    #[error("{}: {said}", path.display())]
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// The format, and how to convert the file to npz.
+        said: String,
+    },
+    /// It is an npz file that holds no FRFs.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// It is not an npz file, and as a universal file it holds no FRFs.
+    #[error(transparent)]
+    Uff(#[from] FrfUffError),
+}
+
+/// Whether the file is an archive of arrays.
+///
+/// # Errors
+/// It cannot be read.
+pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
+    let mut first = Vec::new();
+    foreign::open(path)
+        .and_then(|(file, _)| file.take(4).read_to_end(&mut first))
+        .map_err(|source| FrfFileError::Open { path: path.into(), source })?;
+    // a zip archive begins with its first entry, an empty one with its end
+    Ok(first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06"))
+}
+
+/// Refuses a file of another program's format, naming the format and how to convert it to npz.
+///
+/// # Errors
+/// [`FrfFileError::OtherFormat`], [`FrfFileError::Open`].
+pub(super) fn refuse_other_formats(path: &Path, wanted: Contents) -> Result<(), FrfFileError> {
+    match not_read_here(path, wanted) {
+        Ok(None) => Ok(()),
+        Ok(Some(said)) => Err(FrfFileError::OtherFormat { path: path.into(), said }),
+        Err(source) => Err(FrfFileError::Open { path: path.into(), source }),
+    }
+}
+
+/// Reads FRFs from an npz or a universal file, in SI. `stated` units override the file's.
+///
+/// # Errors
+/// [`FrfFileError`] with the file and what is wrong in it.
+pub fn read_frf_file(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, FrfFileError> {
+    if is_npz(path)? {
+        return Ok(read_labelled(path, stated)?);
+    }
+    refuse_other_formats(path, Contents::Frfs)?;
+    Ok(read_frf_uff(path, stated)?)
 }
 
 #[cfg(test)]

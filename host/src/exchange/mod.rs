@@ -12,24 +12,16 @@
 
 #[cfg(test)]
 mod any_bytes_tests;
-mod archive;
 pub mod channel_records;
-pub mod direction;
-pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
-pub mod geometry_file;
 pub mod labelled_frf;
 mod npy_header;
-mod npy_values;
 pub mod npz;
-mod npz_error;
-pub mod npz_output;
 mod other_formats;
 #[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod positions;
-pub mod positions_output;
 pub mod record_file;
 pub mod record_npz;
 pub mod record_uff;
@@ -41,18 +33,17 @@ pub mod typed_table;
 mod uff_axes;
 pub mod uff_output;
 pub mod units;
-mod workbook_parts;
 
 pub use jointrig_uff as uff;
 
 pub(crate) use tables::delimiter;
 
-pub use frf_file::{FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
-pub use geometry_file::{GeometryFileError, read_geometry};
 pub use labelled_frf::LabelledFrf;
-pub use npz_error::NpzError;
+pub use labelled_frf::{FrfFileError, read_frf_file};
+pub use npz::NpzError;
+pub use positions::{GeometryFileError, read_geometry};
 pub use positions::{PositionsError, read_positions};
 pub use record_npz::{
     is_beside_the_contact, read_hysteresis, read_impacts, write_hysteresis, write_impacts, write_level,

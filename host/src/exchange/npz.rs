@@ -5,19 +5,31 @@
 //! what was expected of it. Values are read as a stream. The memory for all that is read of one
 //! file is bounded by the file's size, because a few compressed bytes may expand to a billion
 //! zeros.
+//!
+//! Errors of reading and writing npz files.
+//!
+//! Opens untrusted zip archives only if their list of members is of a bounded length.
+//!
+//! The values of one array: numbers of any width and either byte order, texts, and the order of
+//! their axes.
+//!
+//! Writes arrays into an npz archive: float64, complex128 and unicode, in C order.
 
-use super::archive;
 use super::npy_header::Header;
-use super::npy_values::{in_c_order, letters, number_of};
-use super::npz_error::NpzError;
-use super::units::{self, Unit, UnitError};
-use crate::foreign;
+use super::units;
+use super::units::{Unit, UnitError};
+use crate::{advice, foreign};
+use memchr::memmem;
 use npyz::npz::{array_name_from_file_name, file_name_from_array_name};
+use npyz::{DType, WriteOptions, WriterBuilder};
 use num_complex::Complex;
+use std::borrow::Borrow;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io;
+use std::io::{BufReader, BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use zip::ZipArchive;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// An array in C order: the last index runs fastest.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,8 +61,7 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError::Open`].
     pub fn open(path: &Path) -> Result<Self, NpzError> {
-        let (archive, size) =
-            archive::open(path).map_err(|source| NpzError::Open { path: path.into(), source })?;
+        let (archive, size) = open(path).map_err(|source| NpzError::Open { path: path.into(), source })?;
         Ok(NpzFile { path: path.into(), archive, size, left: foreign::memory_for(size) })
     }
 
@@ -327,9 +338,312 @@ fn of_type(header: &Header) -> String {
     format!("has elements of type {} with {} bytes", header.kind.escape_debug(), header.width)
 }
 
+/// Why an npz file cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum NpzError {
+    /// The file does not exist, cannot be read or is not an npz archive.
+    #[error("{}: cannot be opened as npz: {source}; {}", path.display(), advice::reading(source))]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+    /// An array is missing.
+    #[error("{}: there is no array `{array}` ({expected}); the file has: {available}", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The array.
+        array: String,
+        /// What it should hold.
+        expected: String,
+        /// Names of the arrays in the file.
+        available: String,
+    },
+    /// An array does not have the expected type, shape or value.
+    #[error("{}: array `{array}` {found}; expected {expected}", path.display())]
+    Unexpected {
+        /// The file.
+        path: PathBuf,
+        /// The array.
+        array: String,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+    },
+    /// The arrays are well formed, but do not make an FRF or a record.
+    #[error("{}: {reason}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The file cannot be written.
+    #[error("{}: cannot be written: {source}; {}", path.display(), advice::writing(source))]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+}
+
+/// Most members of an archive.
+const MOST_MEMBERS: u64 = 4096;
+
+/// Signature of an entry of the central directory (the list of members).
+const ENTRY: &[u8] = b"PK\x01\x02";
+/// Signature and length of the zip64 end of central directory record.
+const END_OF_LARGE: &[u8] = b"PK\x06\x06";
+const END_OF_LARGE_BYTES: usize = 56;
+
+/// An archive and the size of its file.
+pub(super) type Opened = (ZipArchive<BufReader<File>>, u64);
+
+/// Opens the archive at `path`.
+///
+/// # Errors
+/// As [`foreign::open`]; [`ErrorKind::InvalidData`] for a file that is not a zip archive or lists
+/// too many members.
+pub(super) fn open(path: &Path) -> io::Result<Opened> {
+    let (mut file, size) = foreign::open(path)?;
+    refuse_long_lists(&mut file, size)?;
+    Ok((ZipArchive::new(BufReader::new(file))?, size))
+}
+
+/// Counts the members by the signature of their entries before the archive is opened: the zip
+/// reader allocates memory for all members that an archive claims or lists, before their number can
+/// be checked.
+fn refuse_long_lists(file: &mut File, size: u64) -> io::Result<()> {
+    let refused = |what: String| Err(io::Error::new(ErrorKind::InvalidData, what));
+    let (entry, end) = (memmem::Finder::new(ENTRY), memmem::Finder::new(END_OF_LARGE));
+    let (mut buffer, mut kept, mut members) = (vec![0; 1 << 18], 0, 0u64);
+    loop {
+        let read = file.read(&mut buffer[kept..])?;
+        let there = &buffer[..kept + read];
+        let last = read == 0;
+        // a signature in the last bytes is examined together with the next block
+        let done = if last { there.len() } else { there.len().saturating_sub(END_OF_LARGE_BYTES) };
+        members += entry.find_iter(there).filter(|at| *at < done).count() as u64;
+        if members > MOST_MEMBERS {
+            return refused(format!("it lists more than {MOST_MEMBERS} members"));
+        }
+        for at in end.find_iter(there).filter(|at| *at < done) {
+            let word = |from: usize| {
+                let bytes = there.get(at + from..at + from + 8).and_then(|bytes| bytes.try_into().ok());
+                bytes.map_or(0, u64::from_le_bytes)
+            };
+            // the same four bytes within compressed data are followed by a length that exceeds the
+            // file's size
+            let claimed = word(24).max(word(32));
+            if word(4) <= size && claimed > MOST_MEMBERS {
+                return refused(format!(
+                    "it claims to list {claimed} members, at most {MOST_MEMBERS} are read"
+                ));
+            }
+        }
+        if last {
+            break;
+        }
+        let end = there.len();
+        buffer.copy_within(done..end, 0);
+        kept = end - done;
+    }
+    file.seek(SeekFrom::Start(0)).map(|_| ())
+}
+
+/// Converts the bytes of an element to a number; the second argument is whether they are
+/// big-endian.
+pub(super) type FromBytes = fn(&[u8], bool) -> Complex<f64>;
+
+/// The function that reads a number of this type from its bytes; `None` for other types.
+pub(super) fn number_of(header: &Header) -> Option<FromBytes> {
+    /// The bytes of an element in little-endian order.
+    fn low_first<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
+        let mut word = [0; N];
+        word.copy_from_slice(bytes);
+        if big {
+            word.reverse();
+        }
+        word
+    }
+    macro_rules! real {
+        ($of:ty) => {
+            |bytes, big| Complex::new(<$of>::from_le_bytes(low_first(bytes, big)) as f64, 0.0)
+        };
+    }
+    macro_rules! complex {
+        ($of:ty, $width:literal) => {
+            |bytes, big| {
+                let part = |bytes| f64::from(<$of>::from_le_bytes(low_first(bytes, big)));
+                Complex::new(part(&bytes[..$width]), part(&bytes[$width..]))
+            }
+        };
+    }
+    Some(match (header.kind, header.width) {
+        ('f', 4) => real!(f32),
+        ('f', 8) => real!(f64),
+        ('c', 8) => complex!(f32, 4),
+        ('c', 16) => complex!(f64, 8),
+        ('i', 1) => real!(i8),
+        ('i', 2) => real!(i16),
+        ('i', 4) => real!(i32),
+        ('i', 8) => real!(i64),
+        ('u', 1) => real!(u8),
+        ('u', 2) => real!(u16),
+        ('u', 4) => real!(u32),
+        ('u', 8) => real!(u64),
+        _ => return None,
+    })
+}
+
+/// The text of an element without its zero padding.
+pub(super) fn letters(bytes: &[u8], header: &Header) -> Result<String, String> {
+    let damaged = || "is damaged (its text is none)".to_owned();
+    if header.kind != 'U' {
+        let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        return Ok(std::str::from_utf8(&bytes[..end]).map_err(|_| damaged())?.into());
+    }
+    let mut text = String::new();
+    for letter in bytes.as_chunks::<4>().0 {
+        let code = if header.big { u32::from_be_bytes(*letter) } else { u32::from_le_bytes(*letter) };
+        text.push(char::from_u32(code).ok_or_else(damaged)?);
+    }
+    text.truncate(text.trim_end_matches('\0').len());
+    Ok(text)
+}
+
+/// Rearranges stored values so that the last index runs fastest.
+pub(super) fn in_c_order<T: Clone>(values: Vec<T>, header: &Header) -> Vec<T> {
+    let shape = &header.shape;
+    if !header.fortran || shape.len() < 2 {
+        return values;
+    }
+    let mut index = vec![0; shape.len()];
+    let mut out = Vec::with_capacity(values.len());
+    for _ in 0..values.len() {
+        let at = shape.iter().zip(&index).rev().fold(0, |at, (&n, &i)| at * n + i);
+        out.push(values[at].clone());
+        for axis in (0..shape.len()).rev() {
+            index[axis] += 1;
+            if index[axis] < shape[axis] {
+                break;
+            }
+            index[axis] = 0;
+        }
+    }
+    out
+}
+
+/// An npz file being written.
+pub struct NpzOutput {
+    path: PathBuf,
+    archive: ZipWriter<BufWriter<File>>,
+    packing: CompressionMethod,
+}
+
+impl NpzOutput {
+    /// Creates the file or replaces an existing one.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn create(path: &Path) -> Result<Self, NpzError> {
+        let file = File::create(path).map_err(|source| NpzError::Write { path: path.into(), source })?;
+        let archive = ZipWriter::new(BufWriter::new(file));
+        Ok(NpzOutput { path: path.into(), archive, packing: CompressionMethod::Deflated })
+    }
+
+    /// Stores arrays without compression, as numpy's `savez` does; for numbers that hardly
+    /// compress.
+    #[must_use]
+    pub fn unpacked(self) -> Self {
+        NpzOutput { packing: CompressionMethod::Stored, ..self }
+    }
+
+    /// Adds a float64 array in C order.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn real(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item: Borrow<f64>>,
+    ) -> Result<(), NpzError> {
+        self.array(name, shape, "<f8", values.into_iter().map(|v| *v.borrow()))
+    }
+
+    /// Adds a complex128 array in C order.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn complex(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        values: impl IntoIterator<Item: Borrow<Complex<f64>>>,
+    ) -> Result<(), NpzError> {
+        self.array(name, shape, "<c16", values.into_iter().map(|v| *v.borrow()))
+    }
+
+    /// Adds a unicode array.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn text(&mut self, name: &str, shape: &[usize], values: &[String]) -> Result<(), NpzError> {
+        // numpy has no text type of width zero
+        let width = values.iter().map(|v| v.chars().count()).max().unwrap_or(0).max(1);
+        self.array(name, shape, &format!("<U{width}"), values.iter().cloned())
+    }
+
+    fn array<T: npyz::Serialize>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        kind: &str,
+        values: impl Iterator<Item = T>,
+    ) -> Result<(), NpzError> {
+        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+        // a fixed date keeps files of the same content identical
+        let options = SimpleFileOptions::default()
+            .last_modified_time(zip::DateTime::default())
+            .compression_method(self.packing)
+            // records are the bulk of the data: the default level takes 2.5 times as long for half
+            // the size
+            .compression_level((self.packing == CompressionMethod::Deflated).then_some(1))
+            .large_file(shape.iter().product::<u64>() > 100_000_000);
+        let dtype = DType::new_scalar(kind.parse().expect("type strings above are numpy's own"));
+        let archive = &mut self.archive;
+        let written = archive.start_file(file_name_from_array_name(name), options).map_err(io::Error::from);
+        let written = written.and_then(|()| {
+            let array = WriteOptions::<T>::new().dtype(dtype).shape(&shape);
+            // buffered, because the compressor processes each write separately, however small
+            let mut gathered = BufWriter::with_capacity(1 << 16, archive);
+            let mut array = array.writer(&mut gathered).begin_nd()?;
+            array.extend(values)?;
+            array.finish()?;
+            gathered.flush()
+        });
+        written.map_err(|source| NpzError::Write { path: self.path.clone(), source })
+    }
+
+    /// Closes the archive.
+    ///
+    /// # Errors
+    /// [`NpzError::Write`].
+    pub fn finish(self) -> Result<(), NpzError> {
+        let closed = self.archive.finish().map_err(io::Error::from);
+        let flushed = closed.and_then(|mut file| file.flush());
+        flushed.map_err(|source| NpzError::Write { path: self.path, source })
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::npz_output::NpzOutput;
+    use super::NpzOutput;
     use super::*;
     use zip::write::SimpleFileOptions;
 
@@ -401,5 +715,88 @@ mod tests {
         let error =
             NpzFile::open(file.path()).expect("a zip").real("force", "the force").expect_err("changed");
         assert!(error.to_string().contains("is damaged"), "{error}");
+    }
+}
+
+#[cfg(test)]
+mod archive_tests {
+    use super::*;
+    use std::io::Write;
+    use zip::write::SimpleFileOptions;
+
+    fn of(members: usize) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::new().expect("a temporary file");
+        let mut zip = zip::ZipWriter::new(file.reopen().expect("the same file"));
+        for member in 0..members {
+            zip.start_file(format!("{member}.npy"), SimpleFileOptions::default()).expect("a member");
+        }
+        zip.finish().expect("closed");
+        file
+    }
+
+    #[test]
+    fn a_list_longer_than_any_tools_is_refused() {
+        assert_eq!(open(of(1000).path()).expect("a good archive").0.len(), 1000);
+        let said = open(of(5000).path()).map(|_| ()).expect_err("too many").to_string();
+        assert!(said.contains("4096"), "{said}");
+    }
+
+    #[test]
+    fn a_claim_of_many_members_makes_no_room_for_them() {
+        let file = of(1);
+        let good = std::fs::read(file.path()).expect("readable");
+        let end = memmem::find(&good, b"PK\x05\x06").expect("its end");
+        let mut bytes = good[..end].to_vec();
+        let at = bytes.len() as u64;
+        bytes.extend(END_OF_LARGE);
+        bytes.extend(44u64.to_le_bytes());
+        bytes.extend([45, 0, 45, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+        for word in [1u64 << 40, 1 << 40, 1 << 50, 0] {
+            bytes.extend(word.to_le_bytes());
+        }
+        bytes.extend(b"PK\x06\x07\0\0\0\0");
+        bytes.extend(at.to_le_bytes());
+        bytes.extend([1, 0, 0, 0]);
+        bytes.extend(b"PK\x05\x06\0\0\0\0\xff\xff\xff\xff");
+        bytes.extend([0xff; 8]);
+        bytes.extend([0, 0]);
+        file.reopen().and_then(|mut file| file.write_all(&bytes)).expect("written");
+        let said = open(file.path()).map(|_| ()).expect_err("a lie").to_string();
+        assert!(said.contains("claims to list"), "{said}");
+    }
+}
+
+#[cfg(test)]
+mod npy_values_tests {
+    use super::*;
+
+    #[test]
+    fn fortran_order_is_turned() {
+        // column by column: (0,0) (1,0) (0,1) (1,1) (0,2) (1,2)
+        let of =
+            |shape: &[usize]| Header { kind: 'f', width: 8, big: false, fortran: true, shape: shape.into() };
+        let turned = in_c_order(vec![1, 4, 2, 5, 3, 6], &of(&[2, 3]));
+        assert_eq!(turned, [1, 2, 3, 4, 5, 6]);
+        let three = in_c_order((0..24).collect(), &of(&[2, 3, 4]));
+        // (1, 2, 3) is at 1 + 2·2 + 6·3 in Fortran order and last in C order
+        assert_eq!(three[23], 23);
+        // (0, 1, 2) is at 0 + 2·1 + 6·2
+        assert_eq!(three[4 + 2], 14);
+    }
+
+    #[test]
+    fn numbers_and_texts_of_either_byte_order() {
+        let of = |kind, width, big| Header { kind, width, big, fortran: false, shape: Vec::new() };
+        let number =
+            |kind, bytes: &[u8], big| number_of(&of(kind, bytes.len(), big)).map(|number| number(bytes, big));
+        assert_eq!(number('i', &[0xfe, 0xff], false), Some(Complex::new(-2.0, 0.0)));
+        assert_eq!(number('u', &[1, 2], true), Some(Complex::new(258.0, 0.0)));
+        let parts = [2.5f32.to_be_bytes(), (-1.0f32).to_be_bytes()].concat();
+        assert_eq!(number('c', &parts, true), Some(Complex::new(2.5, -1.0)));
+        assert_eq!(number('f', &[0; 2], false), None);
+        let text = [0, 0, 0, 0xb5, 0, 0, 0, b'm', 0, 0, 0, 0];
+        assert_eq!(letters(&text, &of('U', 12, true)).as_deref(), Ok("µm"));
+        assert_eq!(letters(b"a\0", &of('S', 2, false)).as_deref(), Ok("a"));
+        assert!(letters(&[0xff; 4], &of('U', 4, false)).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! Impact records of a file with their units and the signed axes of their labels. Responses are
 //! turned to x, y and z, or to the axes that a plan gives for the location.
 
-use super::direction::{Beside, along, axis_name, beside, turned_words, vector_name, vector_names};
+use super::labelled_frf::{Beside, along, axis_name, beside, turned_words, vector_name, vector_names};
 use crate::spectra::ImpactRecords;
 
 /// Impact records of a file in SI, with the information from its labels.

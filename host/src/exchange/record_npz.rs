@@ -1,8 +1,8 @@
 //! Time records in npz: impact records, and hysteresis records.
 
+use super::npz::NpzError;
 use super::npz::NpzFile;
-use super::npz_error::NpzError;
-use super::npz_output::NpzOutput;
+use super::npz::NpzOutput;
 use super::other_formats::{Contents, not_read_here};
 use super::record_file::{Directions, RecordFile};
 use super::units::{Dimension, StatedUnits, Unit};

@@ -5,9 +5,9 @@
 //! is later than the force's is aligned in time by whole samples; the remainder is stored as its
 //! delay.
 
-use super::direction::axis_name;
 use super::frf_uff::label;
 use super::labelled_frf::Label;
+use super::labelled_frf::axis_name;
 use super::other_formats::Contents as Wanted;
 use super::record_file::{Directions, RecordFile};
 use super::record_npz::{MOST_CHANNELS, MOST_HITS, read_records};
@@ -16,7 +16,7 @@ use super::uff_axes::{
     Places, Sampling, Scale, UnitSystem, force_scale, motion_scale, time_scale, type_name, with_units,
 };
 use super::units::{Dimension, StatedUnits, Unit, told};
-use super::{FrfUffError, NpzError, frf_file, frf_uff};
+use super::{FrfUffError, NpzError, frf_uff, labelled_frf};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,7 +26,7 @@ use std::path::Path;
 pub enum RecordFileError {
     /// The file cannot be read, or has another program's format.
     #[error(transparent)]
-    Open(#[from] frf_file::FrfFileError),
+    Open(#[from] labelled_frf::FrfFileError),
     /// It is an npz file without impact records.
     #[error(transparent)]
     Npz(#[from] NpzError),
@@ -40,7 +40,7 @@ pub enum RecordFileError {
 /// # Errors
 /// [`RecordFileError`] with the file and what is wrong in it.
 pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile, RecordFileError> {
-    if frf_file::is_npz(path)? {
+    if labelled_frf::is_npz(path)? {
         return Ok(read_records(path, stated)?);
     }
     let contents = record_contents(path)?;
@@ -53,7 +53,7 @@ pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile,
 /// # Errors
 /// The file cannot be read, or has another program's format.
 pub fn record_contents(path: &Path) -> Result<Contents, RecordFileError> {
-    frf_file::refuse_other_formats(path, Wanted::Records)?;
+    labelled_frf::refuse_other_formats(path, Wanted::Records)?;
     Ok(frf_uff::contents(path)?)
 }
 

@@ -2,8 +2,8 @@
 //! kind are tested in `uff/round_trip.rs`, arrays of any type in `any_bytes_tests.rs`.
 
 use super::frf_uff::{read_frf_uff, to_functions, write_uff};
-use super::positions_output::write_positions;
 use super::record_uff::read_record_file;
+use super::tables_output::write_positions;
 use super::uff::{ByteOrder, Encoding};
 use super::units::StatedUnits;
 use super::{

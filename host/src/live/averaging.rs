@@ -8,7 +8,7 @@ use crate::analyse::{AnalysedLength, LINES_HZ};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::store::record_row::RecordRow;
+use crate::campaign::store::record_table::RecordRow;
 use crate::report::cell_records::Shown;
 use crate::spectra::{
     CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate,

@@ -12,7 +12,7 @@ use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::level_table::LevelRow;
-use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::record_table::{Damaged, RecordRow};
 
 /// Number of last hits from which the pace is computed.
 const PACE: usize = 40;

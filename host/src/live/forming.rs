@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::bus::Bus;
-use super::found::Found;
 use super::message::Message;
+use super::numbers::Found;
 use crate::campaign::store::Store;
 
 /// The analysis pauses for this many times its own duration, so that it takes at most a sixth of

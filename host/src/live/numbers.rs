@@ -1,13 +1,27 @@
 //! Numbers of every cell for the matrix view: its hammer force, the random error of its FRF, and
 //! its coherence.
+//!
+//! The results of an analysis of the campaign so far that a page needs. A separate process runs the
+//! analysis and writes them; the serving process reads them. The memory of the analysis is released
+//! with its process, so that the measuring process does not grow.
 
-use serde::{Deserialize, Serialize};
-
+use super::message::Estimate;
+use crate::analyse::{AnalyseError, Wanted};
 use crate::campaign::plan::configuration_name;
+use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
-use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::Rows;
-use crate::results::{Cells, MAIN_BAND};
+use crate::outside::shown_json;
+use crate::report;
+use crate::report::figure::Figure;
+use crate::report::figure_fragment;
+use crate::report::words::brief;
+use crate::results::{Cells, MAIN_BAND, Results};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A cell's numbers; `None` where not known yet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -82,6 +96,61 @@ fn median(frequency_hz: &[f64], coherence: &[f64]) -> Option<f64> {
     let mut inside: Vec<f64> = inside.map(|(_, c)| *c).collect();
     inside.sort_by(f64::total_cmp);
     inside.get(inside.len() / 2).copied()
+}
+
+/// Results of an analysis.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// The estimate.
+    pub estimate: Estimate,
+    /// Data quality of each cell.
+    pub cells: Vec<CellHeard>,
+    /// All figures for which there are data, by name, as JSON for the page.
+    pub figures: BTreeMap<String, String>,
+}
+
+impl Found {
+    /// Analyses a campaign file whose newest record is `last`. If the analysis fails, the result
+    /// contains the reason and what is missing.
+    pub fn of(path: &Path, last: i64) -> Self {
+        let results = Store::open_read_only(path)
+            .map_err(AnalyseError::from)
+            .and_then(|store| report::analysed(&store, Wanted::default(), &|_| {}));
+        match results {
+            Ok(results) => Self::of_results(&results, last),
+            Err(error) => Self::none(last, error.to_string()),
+        }
+    }
+
+    /// Empty results with a reason.
+    pub fn none(last: i64, why: String) -> Self {
+        let estimate = Estimate { after_record: last, missing: vec![why], ..Estimate::default() };
+        Found { estimate, ..Self::default() }
+    }
+
+    fn of_results(results: &Results, last: i64) -> Self {
+        let figures = report::all_figures(results);
+        let estimate = Estimate {
+            after_record: last,
+            hits: results.hits.iter().filter(|hit| hit.kept).count(),
+            took_s: 0.0,
+            answer: json!(results.answer),
+            lines: brief::answer(results).into_iter().map(|line| [line.head, line.text]).collect(),
+            missing: results.missing.clone(),
+            figures: figures.iter().map(|figure| figure.name.to_owned()).collect(),
+        };
+        Found {
+            estimate,
+            cells: results.cells.as_ref().map(heard).unwrap_or_default(),
+            figures: figures.iter().map(|figure| (figure.name.to_owned(), drawn(figure))).collect(),
+        }
+    }
+}
+
+/// A figure as JSON for the page: its data, and the static drawing that is shown until the page has
+/// rendered the data.
+pub fn drawn(figure: &Figure) -> String {
+    shown_json(&json!({ "figure": figure, "html": figure_fragment(figure) }).to_string()).into_owned()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Source};
 use super::svg;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::store::record_row::RecordRow;
+use crate::campaign::store::record_table::RecordRow;
 
 /// Time range of the close view, ms after the trigger: pulse, rebound, and the first response of
 /// the structure.

@@ -4,29 +4,34 @@
 //! The page is a single self-contained HTML text: figures are inline SVG, nothing is fetched, and
 //! it can be printed. Everything shown is contained in [`Results`]; this module computes no
 //! results.
+//!
+//! The document of a campaign file: written by `jointrig analyse`, and shown on a page during the
+//! measurement.
 
-mod analysed;
+use crate::analyse::{AnalyseError, Findings, Missing, Progress, Wanted, analyse};
+use crate::campaign::store::Store;
+use crate::results::{Compared, Place, Results};
+use crate::structure::Structure;
+use crate::substructuring::Frf;
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::{fs, io};
+use words::missing_sentences;
+
+pub use document::{compare, document};
+pub use page::{chart_style, comparison_page, figure_fragment, page, script};
+
 pub mod cell_records;
 mod csv;
 mod document;
 pub mod figure;
 mod figures;
 mod page;
-#[cfg(feature = "png")]
-mod png;
 mod scale;
 mod svg;
 mod tables;
 pub mod words;
-
-pub use analysed::{WithFrfs, analysed, analysed_with_frfs, must_hold_something};
-pub use document::{compare, document};
-pub use page::{chart_style, comparison_page, figure_fragment, page, script};
-
-use crate::results::{Compared, Place, Results};
-use std::fs::{self, File};
-use std::io::{self, Write};
-use std::path::Path;
 
 /// The file for scripts.
 pub const RESULTS_FILE: &str = "results.json";
@@ -141,7 +146,7 @@ pub fn write_figure(figure: &figure::Figure, format: Format, path: &Path) -> io:
     let content = match format {
         Format::Svg => svg::file(figure).into_bytes(),
         #[cfg(feature = "png")]
-        Format::Png => png::png(&svg::file(figure)).map_err(io::Error::other)?,
+        Format::Png => scale::png(&svg::file(figure)).map_err(io::Error::other)?,
         Format::Csv => csv::csv(figure).into_bytes(),
     };
     write_whole(path, &content)
@@ -174,6 +179,74 @@ pub fn write_whole(place: &Path, content: &[u8]) -> io::Result<()> {
         let _ = fs::remove_file(&beside);
     }
     written
+}
+
+/// Analyses the file's contents. The true parameters of a simulated rig are added to the document
+/// after the analysis, so that no estimator can use them.
+///
+/// # Errors
+/// The file cannot be read, or holds nothing to analyse.
+pub fn analysed(
+    store: &Store,
+    wanted: Wanted,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Results, AnalyseError> {
+    written(store, analyse(store, wanted, progress)?)
+}
+
+/// Results of a file together with its FRFs.
+#[derive(Debug)]
+pub struct WithFrfs {
+    /// As returned by [`analysed`].
+    pub results: Results,
+    /// The FRFs of [`Findings::frfs`].
+    pub frfs: Vec<(Structure, Frf)>,
+    /// Messages about records that cannot be used.
+    pub told: Vec<String>,
+}
+
+/// As [`analysed`], with the FRFs of all pairs.
+///
+/// # Errors
+/// As for [`analysed`].
+pub fn analysed_with_frfs(
+    store: &Store,
+    wanted: Wanted,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<WithFrfs, AnalyseError> {
+    let mut found = analyse(store, Wanted { frfs: true, ..wanted }, progress)?;
+    let frfs = std::mem::take(&mut found.frfs);
+    let of_records = found.missing.iter().filter(|missing| matches!(missing, Missing::Records { .. }));
+    let told = of_records.map(missing_sentences::sentence).collect();
+    Ok(WithFrfs { results: written(store, found)?, frfs, told })
+}
+
+fn written(store: &Store, found: Findings) -> Result<Results, AnalyseError> {
+    let mut results = document(found);
+    if let Some(answer) = &mut results.answer {
+        answer.truth = store.simulated_truth()?;
+    }
+    Ok(results)
+}
+
+/// Checks that anything was found at all: an empty document must not be mistaken for a result.
+///
+/// # Errors
+/// The first reason, as a sentence.
+pub fn must_hold_something(found: &Results) -> Result<(), String> {
+    let answered = found.answer.as_ref().is_some_and(|answer| {
+        answer.contact.k_t_n_per_m.is_some()
+            || answer.between_arms.k_n_per_m.is_some()
+            || answer.clamp.is_some()
+    });
+    if answered || !found.joint.is_empty() || !found.recommended.is_empty() || !found.hysteresis.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{}: no stiffness could be found from this file: {}",
+        found.source.file,
+        found.missing.first().map_or("it holds no good hits and no levels", String::as_str)
+    ))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The command `hysteresis`, as a user runs it: valid and invalid records.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
 
-use jointrig::exchange::npz_output::NpzOutput;
+use jointrig::exchange::npz::NpzOutput;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

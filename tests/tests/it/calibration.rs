@@ -4,7 +4,7 @@
 
 use jointrig::campaign::plan::{CONTACT, SMALL};
 use jointrig::campaign::store::Store;
-use jointrig::campaign::store::record_row::RecordRow;
+use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::channels::ChannelMap;
 use jointrig_tests::command::jointrig;
 use jointrig_tests::drawn_campaigns::found;

@@ -20,7 +20,7 @@ type Content = BTreeMap<(i64, u32), (String, String, u32)>;
 
 fn content(file: &Path) -> Content {
     let store = Store::open_read_only(file).unwrap();
-    let row = |row: &jointrig::campaign::store::record_row::RecordRow| {
+    let row = |row: &jointrig::campaign::store::record_table::RecordRow| {
         let crc = codec::checksum(&store.samples(row).unwrap().codes);
         ((row.cell, row.attempt), (row.verdict.name().to_owned(), format!("{:?}", row.measure), crc))
     };

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
-use jointrig::campaign::store::record_row::{NewRecord, RecordRow};
+use jointrig::campaign::store::record_table::{NewRecord, RecordRow};
 use jointrig::campaign::store::session_table::Counters;
 use jointrig::campaign::verdict::{Kind, Verdict};
-use jointrig::device::recording::Recording;
+use jointrig::device::stream::Recording;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::campaign::{origins, rows};
 use jointrig_tests::command::jointrig;

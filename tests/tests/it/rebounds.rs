@@ -9,7 +9,7 @@ use jointrig::campaign::verdict::judge::{ByRecord, Judge};
 use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::channels::ChannelMap;
-use jointrig::device::recording::Recording;
+use jointrig::device::stream::Recording;
 use jointrig_hil_sim::rig::{self, Measured, Rig, RigConfig};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::request::Configuration;

@@ -5,9 +5,9 @@
 use std::path::Path;
 
 use jointrig::campaign::store::Store;
-use jointrig::campaign::store::simulated::{ContactLaw, SimulatedRig};
+use jointrig::campaign::store::{ContactLaw, SimulatedRig};
 use jointrig::device::address::Address;
-use jointrig::device::transport::Transport;
+use jointrig::device::address::Transport;
 use jointrig_hil_sim::board::VirtualBoard;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::serve;

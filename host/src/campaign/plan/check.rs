@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::Plan;
 use super::faults::Faults;
-use super::geometry::ResponsePoint;
+use super::sensor::ResponsePoint;
 use super::sensor::check_sensors;
 
 /// Largest plausible amplitude at the contact, m: catches a plan written in µm.

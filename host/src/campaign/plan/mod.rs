@@ -3,34 +3,33 @@
 //! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and
 //! every error names file, line and field. Lengths are in m, forces in N, times in s unless a name
 //! states otherwise.
+//!
+//! Synchronisation with another recorder.
+//!
+//! Who swings the hammer.
+//!
+//! The laboratory's measurement errors: the plan's `[priors]`.
+
+use crate::contact::ContactPriors;
+use crate::structure::Structure;
+use faults::Faults;
+use jointrig_protocol::request::Configuration;
+use jointrig_protocol::sync::Clock;
+use serde::Deserialize;
+use toml::Spanned;
+
+pub use cells::{Cell, MOST_CELLS};
+pub use sensor::{CalibrationFile, SensorPlan};
+pub use sensor::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
+pub use structure::{StructurePlan, turned};
 
 mod answers;
 mod cells;
 mod check;
 mod faults;
-mod geometry;
-mod hammer;
 pub mod level;
-mod load_cells;
-mod priors;
-mod response_channels;
-mod sense;
 mod sensor;
 mod structure;
-mod sync;
-
-pub use cells::{Cell, MOST_CELLS};
-pub use geometry::{GeometryPlan, ImpactPoint, ResponsePoint, SensorPoint};
-pub use hammer::{HammerPlan, Swung};
-pub use priors::PriorsPlan;
-pub use sensor::{CalibrationFile, SensorPlan};
-pub use structure::{StructurePlan, turned};
-pub use sync::{ClockSource, SyncPlan};
-
-use crate::structure::Structure;
-use jointrig_protocol::request::Configuration;
-use serde::Deserialize;
-use toml::Spanned;
 
 /// The paper's campaign: 252 cells of 8 hits.
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
@@ -315,6 +314,141 @@ fn field(text: &str, wrong: &toml::de::Error) -> String {
     match line {
         Some(line) if !line.is_empty() && !said.contains(line) => format!("{said} (at `{line}`)"),
         _ => said,
+    }
+}
+
+/// Synchronisation with another recorder; if absent, the device's own clock times the scans, and no
+/// edges are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SyncPlan {
+    /// The clock that times the scans.
+    pub clock: ClockSource,
+}
+
+/// The clock that times the scans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ClockSource {
+    /// The device's own crystal.
+    Internal,
+    /// The device's clock input, one edge per scan at `record.rate_hz`.
+    External,
+}
+
+impl Plan {
+    /// The clock to select; `None` if the plan does not specify one.
+    pub fn clock(&self) -> Option<Clock> {
+        self.sync.as_ref().map(Spanned::get_ref).map(|own| match own.clock {
+            ClockSource::Internal => Clock::Internal,
+            ClockSource::External => Clock::External { rate_hz: self.record.get_ref().rate_hz },
+        })
+    }
+}
+
+/// Default waiting time for a person to strike, s.
+const PATIENCE_S: f64 = 600.0;
+/// Longest permitted waiting time for a person to strike, s: a day.
+const LONGEST_S: f64 = 86_400.0;
+
+/// The hammer; if absent, the device's coil swings it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HammerPlan {
+    /// Who swings it.
+    pub by: Swung,
+    /// How long to wait for a person to strike, s; ten minutes if absent.
+    pub patience_s: Option<f64>,
+}
+
+/// Who swings the hammer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Swung {
+    /// The device's coil, commanded by the host.
+    Coil,
+    /// A person: the host waits for the force.
+    Hand,
+}
+
+impl Plan {
+    /// How long to wait for a person to strike, s; `None` if the coil swings the hammer.
+    pub fn by_hand(&self) -> Option<f64> {
+        let own = self.hammer.as_ref().map(Spanned::get_ref).filter(|own| own.by == Swung::Hand)?;
+        Some(own.patience_s.unwrap_or(PATIENCE_S))
+    }
+
+    pub(super) fn check_hammer(&self, faults: &mut Faults) {
+        let Some(own) = &self.hammer else { return };
+        let at = own.span().start;
+        faults.unless(
+            own.get_ref().patience_s.is_none_or(|patience_s| (1.0..=LONGEST_S).contains(&patience_s)),
+            at,
+            format!("hammer.patience_s must be 1 to {LONGEST_S}"),
+        );
+        faults.unless(
+            self.by_hand().is_none() || self.force.get_ref().softer.is_none(),
+            at,
+            "force.softer needs the coil: nobody hits twice as he means to (hammer.by)",
+        );
+    }
+}
+
+/// Standard deviations; values that are absent default to those of careful manual work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorsPlan {
+    /// Points and impacts on the arms, m along each axis.
+    pub position_m: Option<f64>,
+    /// Added at each aim of hammer and vibrometer, m along each axis.
+    pub aim_m: Option<f64>,
+    /// The hammer's tilt about each axis across its direction, rad.
+    pub hammer_angle_rad: Option<f64>,
+    /// The spots next to the contact, m along each axis.
+    pub spot_m: Option<f64>,
+    /// Points on the specimens, m along each axis.
+    pub specimen_point_m: Option<f64>,
+    /// Gains of the vibrometers, relative.
+    pub gain: Option<f64>,
+    /// Gain of the hammer's force cell, relative.
+    pub hammer_gain: Option<f64>,
+    /// Delays in addition to those that the device reports, s.
+    pub skew_s: Option<f64>,
+}
+
+impl PriorsPlan {
+    /// The priors: the stated values, defaults for the others.
+    pub fn known(&self) -> ContactPriors {
+        let mut known = ContactPriors::default();
+        for (stated, at) in [
+            (self.position_m, &mut known.positions.position_m),
+            (self.aim_m, &mut known.positions.aim_m),
+            (self.hammer_angle_rad, &mut known.positions.hammer_angle_rad),
+            (self.spot_m, &mut known.spot_m),
+            (self.specimen_point_m, &mut known.specimen_point_m),
+            (self.gain, &mut known.gain),
+            (self.hammer_gain, &mut known.hammer_gain),
+            (self.skew_s, &mut known.skew_s),
+        ] {
+            if let Some(stated) = stated {
+                *at = stated;
+            }
+        }
+        known
+    }
+
+    /// The stated values, by name.
+    pub fn stated(&self) -> [(&'static str, Option<f64>); 8] {
+        [
+            ("position_m", self.position_m),
+            ("aim_m", self.aim_m),
+            ("hammer_angle_rad", self.hammer_angle_rad),
+            ("spot_m", self.spot_m),
+            ("specimen_point_m", self.specimen_point_m),
+            ("gain", self.gain),
+            ("hammer_gain", self.hammer_gain),
+            ("skew_s", self.skew_s),
+        ]
     }
 }
 

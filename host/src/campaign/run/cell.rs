@@ -1,22 +1,28 @@
 //! Measures one cell: from the hammer in place until it has enough good hits or is given up with a
 //! reason.
-
-use jointrig_protocol::shot::Shot;
+//!
+//! Instructions for the person at the rig: where hammer and laser go for a cell, and how much is
+//! left to do.
+//!
+//! How quiet the structure must be before the next hit, relative to its motion after the last one.
 
 use super::answers::Question;
 use super::by_hand;
-use super::directions::name;
-use super::error::RunError;
-use super::quiet;
+use super::runner::RunError;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
 use super::stage::{Moved, Stage, Who};
+use crate::campaign::plan::{Cell, Settle, configuration_name};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::codec;
 use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
-use crate::campaign::watch::Seen;
-use crate::device::recording::Recording;
+use crate::campaign::watch::{Left, Seen, Standing};
+use crate::device::channels::ChannelMap;
+use crate::device::stream::Recording;
+use jointrig_protocol::channel::Quantity;
+use jointrig_protocol::shot::Shot;
+use std::f64::consts::PI;
 
 /// Shots of one cell that may be cancelled or find no quiet before the cell is given up.
 const SETBACKS: u32 = 4;
@@ -42,7 +48,7 @@ impl Runner<'_> {
                 return self.cell(row);
             }
         }
-        let mut quiet = quiet::unknown(self.channels);
+        let mut quiet = unknown(self.channels);
         let mut setbacks = 0;
         while (self.tally.open(row.id) || !again.is_empty()) && !self.stopped() {
             if self.recount(Some(row.id)) {
@@ -80,12 +86,12 @@ impl Runner<'_> {
                 if crc == stored {
                     setbacks = 0;
                     if let Outcome::Recorded(recording) = &outcome {
-                        quiet = quiet::after(recording, self.channels, self.plan.settle.get_ref(), 1.0);
+                        quiet = after(recording, self.channels, self.plan.settle.get_ref(), 1.0);
                     }
                 } else {
                     self.differs(row, record)?;
                     again.clear();
-                    quiet = quiet::unknown(self.channels);
+                    quiet = unknown(self.channels);
                     let attempt = self.tally.attempts(row.id);
                     self.go(row, attempt)?;
                 }
@@ -95,7 +101,7 @@ impl Runner<'_> {
                 Outcome::Recorded(recording) => {
                     setbacks = 0;
                     let allowance = if by_hand.is_some() { by_hand::ALLOWANCE } else { 1.0 };
-                    quiet = quiet::after(&recording, self.channels, self.plan.settle.get_ref(), allowance);
+                    quiet = after(&recording, self.channels, self.plan.settle.get_ref(), allowance);
                     self.saw(&Seen::Judging);
                     let verdict = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     if verdict.kind == Kind::Good {
@@ -112,12 +118,7 @@ impl Runner<'_> {
                     let judged = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     let verdict =
                         Verdict { kind: Kind::Noisy, measure: ratio, limit: 1.0, sentence, ..judged };
-                    quiet = quiet::after(
-                        &recording,
-                        self.channels,
-                        self.plan.settle.get_ref(),
-                        by_hand::ALLOWANCE,
-                    );
+                    quiet = after(&recording, self.channels, self.plan.settle.get_ref(), by_hand::ALLOWANCE);
                     self.keep(row, *recording, verdict)?;
                 }
                 Outcome::NobodyStruck => {
@@ -277,4 +278,94 @@ fn loosen(quiet: &mut QuietLimits) {
     for limit in quiet {
         *limit *= 2.0;
     }
+}
+
+impl Runner<'_> {
+    /// Text shown to a person before a cell: where hammer and laser go, and the cell's progress.
+    pub(super) fn directions(&self, row: &CellRow) -> String {
+        let millimetres =
+            |at: [f64; 3]| format!("x {:.1}, y {:.1}, z {:.1} mm", 1e3 * at[0], 1e3 * at[1], 1e3 * at[2]);
+        let (cell, geometry) = (&row.cell, &self.plan.geometry);
+        let impact =
+            geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == cell.impact);
+        let response =
+            geometry.response.iter().map(toml::Spanned::get_ref).find(|point| point.name == cell.response);
+        let hammer = impact.map_or(String::new(), |point| {
+            let [x, y, z] = point.direction;
+            format!(" ({}; pushing along {x} {y} {z})", millimetres(point.position_m))
+        });
+        let laser = response.map_or(String::new(), |point| format!(" ({})", millimetres(point.position_m)));
+        let place = 1 + self.cells.iter().position(|other| other.id == row.id).unwrap_or(0);
+        format!(
+            "cell {place} of {}, structure {}: {} of {} good\n  hammer to {}{hammer}\n  laser to {}{laser}",
+            self.cells.len(),
+            configuration_name(cell.configuration),
+            self.tally.kept_in(row.id),
+            cell.wanted,
+            cell.impact,
+            cell.response,
+        )
+    }
+
+    /// A cell's progress.
+    pub(super) fn standing(&self, row: &CellRow) -> Standing {
+        Standing { kept: self.tally.kept_in(row.id), attempts: self.tally.attempts(row.id) }
+    }
+
+    /// Good hits still wanted in this cell, in this structure, and in total.
+    pub(super) fn left(&self, row: &CellRow) -> Left {
+        let mut left = Left::default();
+        for other in self.cells.iter().filter(|other| self.tally.open(other.id)) {
+            let missing = u64::from(other.cell.wanted.saturating_sub(self.tally.kept_in(other.id)));
+            left.campaign += missing;
+            left.configuration +=
+                if other.cell.configuration == row.cell.configuration { missing } else { 0 };
+            left.cell += if other.id == row.id { missing } else { 0 };
+        }
+        left
+    }
+}
+
+/// A cell's name in a line of the log.
+pub(super) fn name(cell: &Cell) -> String {
+    format!("{} {}, {}", configuration_name(cell.configuration), cell.impact, cell.response)
+}
+
+/// Start of the window in which the motion right after a hit is evaluated (s after the trigger),
+/// when the pulse is over …
+const FROM_S: f64 = 0.002;
+/// … and its length, s: `PERIODS` periods of the slowest mode of interest.
+const FOR_S: f64 = 0.075;
+const PERIODS: f64 = 2.0;
+
+/// Limits for the first hit of a cell: without an earlier hit, any motion is allowed.
+pub fn unknown(channels: &ChannelMap) -> QuietLimits {
+    vec![0.0; channels.len()]
+}
+
+/// Limits after `recording`: for each velocity or acceleration channel a fraction of its rms right
+/// after the hit, but at least the floor; `allowance` (1 or more) loosens them. Other channels are
+/// not limited. For an acceleration, the velocity floor is converted at the frequency of the
+/// slowest mode of interest.
+pub fn after(recording: &Recording, channels: &ChannelMap, settle: &Settle, allowance: f64) -> QuietLimits {
+    let rate = f64::from(channels.rate_hz);
+    let from = recording.trigger_index + (FROM_S * rate) as usize;
+    let to = from + (FOR_S * rate) as usize;
+    channels
+        .channels
+        .iter()
+        .enumerate()
+        .map(|(place, channel)| {
+            let floor = match channel.quantity {
+                Quantity::Velocity => settle.quiet_floor_m_per_s,
+                Quantity::Acceleration => settle.quiet_floor_m_per_s * 2.0 * PI * PERIODS / FOR_S,
+                Quantity::Displacement | Quantity::Force | Quantity::Voltage => return 0.0,
+            };
+            let codes = recording.channel(place);
+            let window = codes.get(from.min(codes.len())..to.min(codes.len())).unwrap_or(&[]);
+            let power: f64 = window.iter().map(|code| f64::from(*code).powi(2)).sum();
+            let rms = (power / window.len().max(1) as f64).sqrt() * channel.units_per_code().abs();
+            (allowance * (settle.quiet_relative * rms).max(floor)) as f32
+        })
+        .collect()
 }

@@ -10,11 +10,11 @@ use std::time::Duration;
 
 use jointrig_protocol::sync::Edge;
 
-use super::edits::{Edits, Recount};
+use super::answers::{Edits, Recount};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::Counters;
 use crate::campaign::watch::{Left, Seen, Watchers};
 

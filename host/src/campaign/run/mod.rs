@@ -9,22 +9,13 @@
 
 pub mod answers;
 pub(in crate::campaign) mod by_hand;
-mod cell;
+pub mod cell;
 mod clock;
-mod directions;
-mod earlier;
-pub mod edits;
-pub mod error;
-mod fit;
-mod forces;
 mod keeper;
 pub mod progress;
 pub mod pulse;
-pub mod quiet;
 pub mod runner;
 pub mod shaking;
 pub mod shot;
 pub mod stage;
-pub mod status;
-mod structure;
 pub mod tally;

@@ -7,40 +7,47 @@
 //! scans with the same pulses: these hits are not stored, each is compared with its stored record,
 //! and the next hit is bit-identical to that of an uninterrupted run. A real structure is not
 //! struck again: it comes to rest, and the cell continues.
-
-use std::collections::{BTreeSet, HashMap};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+//!
+//! A cell's records from earlier runs, and the statistics of the good ones.
+//!
+//! Target force of each hit of a cell: the plan's force, and a lower one for every second hit if
+//! the plan requests it. Each force has a separate closed loop.
+//!
+//! Why a run ends with an error.
 
 use super::answers::Answers;
+use super::answers::{Edits, Recount};
 use super::clock::ScanClock;
-use super::earlier::Earlier;
-use super::edits::{Edits, Recount};
-use super::error::RunError;
-use super::fit::fitted;
-use super::forces::Forces;
 use super::keeper::{Announced, Keeper};
-use super::pulse::Hit;
+use super::pulse::fitted;
+use super::pulse::{FIRST_SLOPE, Hit, PulseLoop};
 use super::shot::Shooter;
-use super::stage::Stage;
-use super::structure::same_or_accepted;
+use super::stage::same_or_accepted;
+use super::stage::{Stage, StageError};
 use super::tally::Tally;
-use crate::campaign::plan::Plan;
+use crate::campaign::plan::{Force, Plan};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
-use crate::campaign::store::record_row::NewRecord;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::is_simulated_board;
+use crate::campaign::store::record_table::{Damaged, NewRecord, RecordRow};
 use crate::campaign::store::rows::Rows;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
-use crate::campaign::store::simulated::is_simulated_board;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::Judge;
+use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use crate::device::error::DeviceError;
 use crate::device::session::Session;
 use crate::device::stream::Accounts;
+use crate::device::stream::Recording;
+use std::collections::{BTreeSet, HashMap, VecDeque};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// How a campaign is run.
 #[derive(Clone, Debug)]
@@ -403,4 +410,216 @@ fn counters(session: &Session) -> Counters {
 /// Converts whether the keeper still works into a result; the cause is reported when it is joined.
 pub(super) fn still(works: bool) -> Result<(), RunError> {
     if works { Ok(()) } else { Err(RunError::KeeperGone) }
+}
+
+/// The records of earlier runs, by cell.
+pub(super) struct Earlier {
+    path: PathBuf,
+    records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
+}
+
+impl Earlier {
+    /// The records of the file at `path`.
+    pub(super) fn new(path: &Path, rows: Vec<Result<RecordRow, Damaged>>) -> Self {
+        let mut records: HashMap<i64, Vec<Result<RecordRow, Damaged>>> = HashMap::new();
+        for row in rows {
+            let cell = row.as_ref().map_or_else(|damaged| damaged.place.cell, |row| row.cell);
+            records.entry(cell).or_default().push(row);
+        }
+        Self { path: path.into(), records }
+    }
+
+    /// Drops a cell's records.
+    pub(super) fn forget(&mut self, cell: i64) {
+        self.records.remove(&cell);
+    }
+
+    /// Statistics of the cell's good records, and its attempts from the first onwards so that they
+    /// can be repeated; no attempts if one is missing or damaged.
+    pub(super) fn of(
+        &self,
+        cell: i64,
+        responses: &[usize],
+        plan: &Plan,
+        channels: &ChannelMap,
+    ) -> Result<(Others, VecDeque<RecordRow>), StoreError> {
+        let Some(records) = self.records.get(&cell) else {
+            return Ok((Others::of(responses.into()), VecDeque::new()));
+        };
+        // the writer runs on another thread; a cell's earlier records were in the file before it
+        // started
+        let store = Store::open_read_only(&self.path)?;
+        let others = learnt(&store, records, responses, plan, channels)?;
+        let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
+        again.sort_by_key(|record| record.attempt);
+        let whole =
+            again.len() == records.len() && again.iter().zip(0..).all(|(record, n)| record.attempt == n);
+        Ok((others, if whole { again.into() } else { VecDeque::new() }))
+    }
+
+    /// Statistics of a cell's good records that are in the file at present.
+    pub(super) fn others_now(
+        &self,
+        cell: i64,
+        responses: &[usize],
+        plan: &Plan,
+        channels: &ChannelMap,
+    ) -> Result<Others, StoreError> {
+        let store = Store::open_read_only(&self.path)?;
+        learnt(&store, &store.records_of(cell)?, responses, plan, channels)
+    }
+}
+
+/// Statistics of the good ones among these records.
+fn learnt(
+    store: &Store,
+    records: &[Result<RecordRow, Damaged>],
+    responses: &[usize],
+    plan: &Plan,
+    channels: &ChannelMap,
+) -> Result<Others, StoreError> {
+    let mut others = Others::of(responses.into());
+    let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
+    for record in records.iter().flatten().filter(kept) {
+        match store.samples(record) {
+            Ok(samples) => others.learn(plan, channels, samples.view()),
+            Err(error @ StoreError::Damaged { .. }) => log::warn!("{error}"),
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(others)
+}
+
+/// The closed loops of all forces.
+#[derive(Clone, Debug)]
+pub struct Forces(Vec<PulseLoop>);
+
+impl Forces {
+    /// Creates one loop, or two. `cap_us` is the device's longest pulse.
+    pub fn new(force: &Force, cap_us: u32) -> Self {
+        let mut loops = vec![PulseLoop::new(force, cap_us)];
+        if let Some(softer) = force.softer {
+            // a first guess that the loop corrects
+            let pulse = f64::from(force.pulse_us) * softer.powf(FIRST_SLOPE.recip());
+            let pulse_us = (pulse.round() as u32).max(force.pulse_bounds_us[0]);
+            let soft = Force { target_n: softer * force.target_n, pulse_us, ..*force };
+            loops.push(PulseLoop::new(&soft, cap_us));
+        }
+        Self(loops)
+    }
+
+    /// The pulse for the next shot in a cell with `kept` good hits, µs.
+    pub fn pulse_us(&self, kept: u32) -> u32 {
+        self.0[kept as usize % self.0.len()].pulse_us()
+    }
+
+    /// Updates the loop after a hit was judged. A record with missing samples is ignored: its peak
+    /// may be among the missing samples, and the loop would lengthen the pulse because of a fault
+    /// of the link.
+    pub fn learn_judged(&mut self, judged: Kind, hit: Hit) {
+        if judged != Kind::Gap {
+            self.learn(hit);
+        }
+    }
+
+    /// Updates the loop whose pulse is nearest to the hit's, so that replaying a stored campaign
+    /// reproduces the state of the running one.
+    fn learn(&mut self, hit: Hit) {
+        if let Some(own) = self.0.iter_mut().min_by_key(|own| own.pulse_us().abs_diff(hit.pulse_us)) {
+            own.learn(hit);
+        }
+    }
+}
+
+/// Why a run ended with an error.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The campaign file.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// Moving hammer or laser.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// The device does not fit the plan.
+    #[error("{address} does not fit the plan: {what}")]
+    Unfit {
+        /// The device.
+        address: String,
+        /// What does not fit, and what to do.
+        what: String,
+    },
+    /// The file's records belong to another structure.
+    #[error("{0}")]
+    AnotherStructure(String),
+    /// The thread that stores records ended without a reason.
+    #[error("records can no longer be stored; run the same command again")]
+    KeeperGone,
+    /// The hammer is swung by a person, and nobody struck.
+    #[error(
+        "{cell}: nobody struck within {seconds} s (hammer.patience_s); run the same command again to go on"
+    )]
+    NobodyStruck {
+        /// The cell.
+        cell: String,
+        /// How long the run waited, s.
+        seconds: f64,
+    },
+    /// The rig is not safe to strike.
+    #[error("{0}; nothing accepted is lost: run the same command again")]
+    Unsafe(&'static str),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FORCE: Force = Force {
+        target_n: 50.0,
+        softer: Some(0.7),
+        tolerance: 0.05,
+        pulse_us: 3_000,
+        pulse_bounds_us: [500, 8_000],
+    };
+
+    fn strike(forces: &mut Forces, kept: u32) -> f64 {
+        let pulse_us = forces.pulse_us(kept);
+        let peak_n = (f64::from(pulse_us) - 1_500.0).max(0.0) * 0.02;
+        forces.learn(Hit { pulse_us, peak_n });
+        peak_n
+    }
+
+    #[test]
+    fn every_second_good_hit_is_softer() {
+        let mut forces = Forces::new(&FORCE, 8_000);
+        let peaks: Vec<f64> = (0..24).map(|kept| strike(&mut forces, kept)).collect();
+        for pair in peaks[16..].chunks(2) {
+            assert!((pair[0] / 50.0 - 1.0).abs() < 0.06 && (pair[1] / 35.0 - 1.0).abs() < 0.06, "{peaks:?}");
+        }
+    }
+
+    #[test]
+    fn a_stored_campaign_teaches_what_the_running_one_did() {
+        let mut forces = Forces::new(&FORCE, 8_000);
+        let mut stored = Vec::new();
+        // a refused hit is repeated with the same force
+        for kept in [0, 0, 1, 2, 3, 3, 4, 5] {
+            let pulse_us = forces.pulse_us(kept);
+            stored.push(Hit { pulse_us, peak_n: (f64::from(pulse_us) - 1_500.0) * 0.025 });
+            forces.learn(stored[stored.len() - 1]);
+        }
+        let mut resumed = Forces::new(&FORCE, 8_000);
+        for hit in stored {
+            resumed.learn(hit);
+        }
+        assert_eq!([0, 1].map(|kept| resumed.pulse_us(kept)), [0, 1].map(|kept| forces.pulse_us(kept)));
+    }
+
+    #[test]
+    fn without_a_softer_force_all_hits_are_alike() {
+        let forces = Forces::new(&Force { softer: None, ..FORCE }, 8_000);
+        assert_eq!(forces.pulse_us(0), forces.pulse_us(1));
+    }
 }

@@ -17,8 +17,8 @@ use jointrig_protocol::shot::{Phase, Shot};
 use crate::campaign::plan::Plan;
 use crate::campaign::watch::{Seen, Watchers};
 use crate::device::error::DeviceError;
-use crate::device::recording::{Recording, by_channel};
 use crate::device::session::Session;
+use crate::device::stream::{Recording, by_channel};
 
 /// Scans between the furthest scan that the device can have reached and the scan requested from it.
 const MARGIN: u64 = 1_024;

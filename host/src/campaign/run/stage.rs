@@ -1,19 +1,25 @@
 //! Who moves hammer and laser: the device itself (virtual rigs), a person, or a user's command.
+//!
+//! Checks, before anything moves, that the structure is the one that the file's records were
+//! measured on: averages over two structures are valid for neither.
 
+use super::answers::{Answers, Key, Question};
+use crate::campaign::plan::{Cell, configuration_name};
+use crate::campaign::store::Store;
+use crate::campaign::store::error::StoreError;
+use crate::campaign::store::session_table::SessionInfo;
+use crate::device::address::Simulated;
+use crate::device::error::DeviceError;
+use crate::device::session::Session;
+use crate::outside::{tell, tell_line};
+use jointrig_protocol::answer::Info;
+use jointrig_protocol::request::Stage as StageRequest;
 use std::io::{BufRead, Write};
 use std::process::Command;
 use std::str::FromStr;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
-
-use jointrig_protocol::request::Stage as StageRequest;
-
-use super::answers::{Answers, Key, Question};
-use crate::campaign::plan::{Cell, configuration_name};
-use crate::device::error::DeviceError;
-use crate::device::session::Session;
-use crate::outside::{tell, tell_line};
 
 /// Who moves hammer and laser.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -278,6 +284,61 @@ fn execute(command: &str, cell: &Cell, attempt: u32) -> Result<(), StageError> {
         .status()
         .map_err(|error| failed(error.to_string()))?;
     if status.success() { Ok(()) } else { Err(failed(status.to_string())) }
+}
+
+/// Evidence, as text for the user, that this is another structure than before; `None` if there is
+/// none, or nothing was measured yet.
+pub(super) fn another(
+    store: &Store,
+    info: &Info,
+    simulated: Option<&Simulated>,
+) -> Result<Option<String>, StoreError> {
+    if store.places()?.is_empty() && store.levels()?.is_empty() {
+        return Ok(None);
+    }
+    if let (Some(was), Some(is)) = (store.simulated_rig()?, simulated) {
+        let named = |name: &str, seed: u64| format!("the simulated rig `{name}`, seed {seed}");
+        let (old, new) = (named(&was.name, was.seed), named(&is.rig, is.seed));
+        return Ok(if old != new {
+            Some(format!("its records are of {old}, and this is {new}"))
+        } else if was.parameters.is_some_and(|old| old != is.parameters) {
+            Some(format!("its records are of {old}, and a parameter of that rig is another one now"))
+        } else {
+            None
+        });
+    }
+    let measured = |own: &&SessionInfo| own.board != SessionInfo::IMPORTED;
+    let sessions = store.sessions()?;
+    let Some(before) = sessions.iter().map(|(_, own)| own).rfind(measured) else { return Ok(None) };
+    let same = (&*before.board, &*before.serial) == (info.board.as_str(), info.serial.as_str());
+    Ok((!same).then(|| {
+        format!(
+            "its records are of the controller {} {}, and this is {} {}",
+            before.board, before.serial, info.board, info.serial
+        )
+    }))
+}
+
+/// Refuses another structure, unless it is accepted: then returns the evidence, to be logged once
+/// the session exists.
+///
+/// # Errors
+/// The error that `refuse` makes of it, or the file cannot be read.
+pub(super) fn same_or_accepted<E: From<StoreError>>(
+    store: &Store,
+    info: &Info,
+    simulated: Option<&Simulated>,
+    accepted: bool,
+    refuse: impl FnOnce(String) -> E,
+) -> Result<Option<String>, E> {
+    match another(store, info, simulated)? {
+        Some(what) if !accepted => Err(refuse(format!(
+            "{}: {what}. Hits of two structures belong into two files: create one with `jointrig campaign new`. If it is the same \
+             structure all the same (a controller was replaced), --new-structure goes on, and the report says so",
+            store.path().display()
+        ))),
+        accepted => Ok(accepted),
+    }
 }
 
 #[cfg(test)]

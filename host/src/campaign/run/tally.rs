@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use crate::campaign::store::cell_table::CellRow;
-use crate::campaign::store::record_row::{Damaged, RecordRow};
+use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::Rows;
 use crate::campaign::verdict::Kind;
 

@@ -1,13 +1,13 @@
+use super::record_table::NewRecord;
 use super::*;
 use crate::campaign::plan::{Plan, SMALL};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::store::record_row::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use crate::device::stream::Recording;
 use crate::frf::{Frf, MotionQuantity};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use jointrig_protocol::request::Configuration;

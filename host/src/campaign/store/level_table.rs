@@ -7,7 +7,7 @@ use super::Store;
 use super::codec::{self, CodecError};
 use super::error::StoreError;
 use super::notes::utc_now;
-use super::record_row::Samples;
+use super::record_table::Samples;
 use super::row_seal;
 use super::table::{Row, insert, table};
 use crate::campaign::plan::level::{Held, Level, Moment};

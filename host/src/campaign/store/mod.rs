@@ -13,44 +13,60 @@
 //! new table is a new `*_table.rs` and a line in `schema.rs`. The rows are: `record_row.rs`
 //! (records and their seals), `overrules.rs`, `cell_table.rs`, `session_table.rs` (sessions,
 //! channels, sensors), `level_table.rs`, `frf_table.rs`, `notes.rs` (plans, log).
+//!
+//! Checks whether the open file is still the one with its name. A file that was replaced, removed
+//! or emptied while it is open accepts every record without an error, but the records are lost.
+//!
+//! One writer at a time: a lock file next to the campaign file, held as long as the campaign file
+//! is open for writing.
+//!
+//! SQLite would let two writers alternate; two campaigns in one file would then strike the same
+//! cells. The operating system releases the lock when the process that holds it ends, for whatever
+//! reason, so a leftover lock file does not block anybody.
+//!
+//! A name does not identify a file: symbolic links are resolved first, and a file with several hard
+//! links is refused. Where a lock on the campaign file itself can coexist with SQLite's locks
+//! (Linux), that lock is held too, so that removing the lock file does not admit a second writer.
+//!
+//! Network shares: SQLite's write-ahead log needs memory shared between processes, which network
+//! file systems do not provide.
+//!
+//! A copy of a campaign file, taken even while the file is being written.
+//!
+//! Data about the simulated rig, if the device was simulated in the process that ran the campaign.
+//!
+//! Two notes of the file: the rig, and the result that an ideal measurement of it would give. The
+//! runner writes them from the rig's parameters; nothing of them crosses the protocol, and no
+//! estimator may read them.
 
-mod backup;
+use crate::device::address::Simulated;
+use error::{StoreError, sqlite};
+use jointrig_protocol::answer::Info;
+use rusqlite::config::DbConfig;
+use rusqlite::{Connection, ErrorCode, OpenFlags, Row};
+use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::fs::{File, Metadata, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
 pub mod calibration_table;
 pub mod cell_table;
 mod chain;
 pub mod codec;
 pub mod error;
 pub mod frf_table;
-mod identity;
 pub mod level_table;
-mod lock;
 pub mod notes;
-pub mod overrules;
-mod own_schema;
-pub mod record_row;
-mod record_table;
-mod replan;
+pub mod record_table;
 mod row_seal;
 pub mod rows;
 mod schema;
 pub mod session_table;
-mod share;
-pub mod simulated;
 pub mod stored;
-pub mod sync_table;
 mod table;
-pub mod temperature_table;
 pub mod verify;
-
-use std::path::{Path, PathBuf};
-use std::time::Duration;
-
-use rusqlite::config::DbConfig;
-use rusqlite::{Connection, ErrorCode, OpenFlags, Row};
-
-use error::{StoreError, sqlite};
-use identity::Identity;
-use lock::WriteLock;
 
 /// Identifies a campaign file (`JRIG`).
 const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
@@ -85,7 +101,7 @@ impl Store {
         if path.exists() {
             return Err(StoreError::Exists { path: path.into() });
         }
-        share::refuse(path)?;
+        refuse(path)?;
         let lock = Some(WriteLock::take(path)?);
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
         let mut connection =
@@ -104,7 +120,7 @@ impl Store {
     /// share, or cannot be written.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         error::refuse_what_is_no_file(path)?;
-        share::refuse(path)?;
+        refuse(path)?;
         let lock = WriteLock::take(path)?;
         let mut store = Self::connect(path, path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         (store.lock, store.tidy) = (Some(lock), false);
@@ -167,7 +183,7 @@ impl Store {
         connection.pragma_update(None, "trusted_schema", false).map_err(open)?;
         // otherwise SQLite prepares the query plan again for each record
         connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_QPSG, true).map_err(open)?;
-        if let Some(what) = own_schema::strange(&connection).map_err(open)? {
+        if let Some(what) = schema::strange(&connection).map_err(open)? {
             return Err(StoreError::Content {
                 path: path.into(),
                 what: format!("{what}. Nothing of it is read"),
@@ -333,4 +349,441 @@ fn rescued(path: &Path) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let named = |number: u32| path.with_file_name(format!("{stem}-rescued-{number}.jrig"));
     (1..1000).map(named).find(|name| !name.exists()).unwrap_or_else(|| named(0))
+}
+
+/// First four bytes of SQLite's log, by the byte order of its checksums (SQLite's file format,
+/// 4.1).
+const LOGS: [u32; 2] = [0x377f_0682, 0x377f_0683];
+
+/// Identifies the file that was opened.
+#[derive(Clone, Debug)]
+pub(super) struct Identity {
+    path: PathBuf,
+    file: Option<(u64, u64)>,
+}
+
+impl Identity {
+    /// Identity of the file that has this name now.
+    pub(super) fn of(path: &Path) -> Self {
+        // SQLite follows a symbolic link, and places its log next to the target
+        let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
+        let file = std::fs::metadata(&path).ok().and_then(|file| inode(&file));
+        Self { path, file }
+    }
+
+    /// What happened to the file or its log since; `None` if both are present. To be called after a
+    /// transaction in WAL mode.
+    pub(super) fn lost(&self) -> Option<String> {
+        let Ok(now) = std::fs::metadata(&self.path) else { return Some("it was removed or renamed".into()) };
+        if self.file.is_some() && inode(&now) != self.file {
+            return Some("another file has its name now".into());
+        }
+        let log = log_of(&self.path);
+        // a log that was emptied and then written to has a hole at its beginning
+        let mut begins = [0; 4];
+        match File::open(&log).and_then(|mut log| log.read_exact(&mut begins)) {
+            Ok(()) if LOGS.contains(&u32::from_be_bytes(begins)) => None,
+            _ => Some(format!("its log {} was removed or emptied", log.display())),
+        }
+    }
+}
+
+/// Device and inode, on systems that have them.
+#[cfg(unix)]
+#[allow(clippy::unnecessary_wraps, reason = "other systems have none")]
+fn inode(file: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((file.dev(), file.ino()))
+}
+
+/// On other systems an open file can be neither removed nor replaced.
+#[cfg(not(unix))]
+fn inode(_: &Metadata) -> Option<(u64, u64)> {
+    None
+}
+
+/// Number of attempts if the lock file disappears while it is being locked.
+const TRIES: usize = 10;
+
+/// The lock; released when dropped.
+#[derive(Debug)]
+pub(super) struct WriteLock {
+    file: File,
+    path: PathBuf,
+    /// The campaign file itself. It is closed after SQLite has closed it: closing it sooner would
+    /// release SQLite's own locks.
+    #[cfg(target_os = "linux")]
+    itself: Option<File>,
+}
+
+impl WriteLock {
+    /// Locks `campaign` for writing.
+    ///
+    /// # Errors
+    /// Another process holds it ([`StoreError::Busy`] says which), or nothing can be written there.
+    pub(super) fn take(campaign: &Path) -> Result<Self, StoreError> {
+        let real = std::fs::canonicalize(campaign).unwrap_or_else(|_| campaign.into());
+        refuse_second_names(&real)?;
+        let path = beside(&real);
+        let failed = |source| StoreError::Lock { path: campaign.into(), source };
+        for _ in 0..TRIES {
+            let mut file = File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(&path)
+                .map_err(failed)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => {
+                    let mut holder = String::new();
+                    // optional: the holder only improves the message
+                    let _ = file.read_to_string(&mut holder);
+                    return Err(StoreError::Busy { path: campaign.into(), holder: holder.trim().into() });
+                }
+                Err(TryLockError::Error(source)) => return Err(failed(source)),
+            }
+            // its previous holder may have removed it after we opened and before we locked it
+            if !still_there(&file, &path) {
+                continue;
+            }
+            let noted = file
+                .set_len(0)
+                .and_then(|()| file.rewind())
+                .and_then(|()| write!(file, "process {}", std::process::id()));
+            if let Err(error) = noted {
+                log::debug!("{}: {error}", path.display());
+            }
+            #[cfg(target_os = "linux")]
+            return Ok(Self { itself: lock_itself(&real)?, file, path });
+            #[cfg(not(target_os = "linux"))]
+            return Ok(Self { file, path });
+        }
+        Err(StoreError::Busy { path: campaign.into(), holder: String::new() })
+    }
+}
+
+impl Drop for WriteLock {
+    fn drop(&mut self) {
+        // removed while locked: another process that has already opened it checks for this
+        let _ = std::fs::remove_file(&self.path);
+        let _ = self.file.unlock();
+        #[cfg(target_os = "linux")]
+        if let Some(itself) = &self.itself {
+            let _ = itself.unlock();
+        }
+    }
+}
+
+/// Locks the campaign file, if it exists: a new one is protected by the lock file until it is
+/// opened again.
+#[cfg(target_os = "linux")]
+fn lock_itself(campaign: &Path) -> Result<Option<File>, StoreError> {
+    let Ok(file) = File::open(campaign) else { return Ok(None) };
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(StoreError::Busy { path: campaign.into(), holder: "its lock file was removed".into() })
+        }
+        // a file system without such locks relies on the lock file
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+    }
+}
+
+/// Refuses a file with a second name: that would have a separate lock file.
+#[cfg(unix)]
+fn refuse_second_names(campaign: &Path) -> Result<(), StoreError> {
+    use std::os::unix::fs::MetadataExt;
+    match std::fs::metadata(campaign) {
+        Ok(file) if file.nlink() > 1 => Err(StoreError::Links { path: campaign.into(), links: file.nlink() }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn refuse_second_names(_: &Path) -> Result<(), StoreError> {
+    Ok(())
+}
+
+fn beside(campaign: &Path) -> PathBuf {
+    let mut name = campaign.file_name().map(OsString::from).unwrap_or_default();
+    name.push("-lock");
+    campaign.with_file_name(name)
+}
+
+#[cfg(unix)]
+fn still_there(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), std::fs::metadata(path)) {
+        (Ok(ours), Ok(there)) => (ours.dev(), ours.ino()) == (there.dev(), there.ino()),
+        _ => false,
+    }
+}
+
+/// On other systems an open file cannot be removed.
+#[cfg(not(unix))]
+fn still_there(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// Network file systems, by their names in Linux's mount table; these may have the prefix `fuse.`.
+const NETWORK: [&str; 22] = [
+    "9p",
+    "afs",
+    "afpfs",
+    "ceph",
+    "cifs",
+    "coda",
+    "davfs",
+    "drvfs",
+    "glusterfs",
+    "gvfsd-fuse",
+    "lustre",
+    "ncpfs",
+    "nfs",
+    "nfs4",
+    "ocfs2",
+    "rclone",
+    "s3fs",
+    "smb2",
+    "smb3",
+    "smbfs",
+    "sshfs",
+    "virtiofs",
+];
+
+/// Refuses to write a campaign on a network share. Only Linux provides a mount table; on other
+/// systems nothing is refused.
+pub(super) fn refuse(campaign: &Path) -> Result<(), StoreError> {
+    let folder = campaign.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (Ok(table), Ok(folder)) = (std::fs::read_to_string("/proc/self/mountinfo"), folder.canonicalize())
+    else {
+        return Ok(());
+    };
+    match network(&table, &folder) {
+        Some(kind) => Err(StoreError::Share { path: campaign.into(), kind }),
+        None => Ok(()),
+    }
+}
+
+/// The kind of file system under `folder`, if it is a network file system. `table` is Linux's
+/// `mountinfo`.
+fn network(table: &str, folder: &Path) -> Option<String> {
+    let mounts = table.lines().filter_map(|line| {
+        // "36 35 98:0 / /mnt rw,noatime shared:1 - ext3 /dev/root rw"
+        let (before, after) = line.split_once(" - ")?;
+        let point = unescaped(before.split(' ').nth(4)?);
+        Some((point, after.split(' ').next()?.to_owned()))
+    });
+    // the longest mount point applies, and the last one mounted there
+    let (_, kind) =
+        mounts.filter(|(point, _)| folder.starts_with(point)).max_by_key(|(point, _)| point.len())?;
+    NETWORK.contains(&kind.trim_start_matches("fuse.")).then_some(kind)
+}
+
+/// Decodes space, tab, newline and backslash, which the kernel writes as octal numbers.
+fn unescaped(text: &str) -> String {
+    [("\\040", " "), ("\\011", "\t"), ("\\012", "\n"), ("\\134", "\\")]
+        .into_iter()
+        .fold(text.to_owned(), |text, (code, character)| text.replace(code, character))
+}
+
+impl Store {
+    /// Copies everything accepted so far to `to`, checks the copy record by record, and only then
+    /// gives it its name; returns the number of records. A running campaign continues meanwhile.
+    ///
+    /// # Errors
+    /// The target exists already, it cannot be written, or the copy is damaged.
+    pub fn back_up(&self, to: &Path) -> Result<usize, StoreError> {
+        if to.exists() {
+            return Err(StoreError::Exists { path: to.into() });
+        }
+        let partial = with_ending(to, ".partial");
+        let copied = self.copy(&partial).and_then(|records| {
+            std::fs::rename(&partial, to)
+                .map_err(|source| StoreError::Lock { path: to.into(), source })
+                .map(|()| records)
+        });
+        if copied.is_err() {
+            for ending in ["", "-wal", "-shm", "-journal"] {
+                // ignore an error: the file may not exist
+                let _ = std::fs::remove_file(with_ending(&partial, ending));
+            }
+        }
+        copied
+    }
+
+    fn copy(&self, to: &Path) -> Result<usize, StoreError> {
+        let failed = |error| sqlite(to, "copying", error);
+        let mut copy = Connection::open(to).map_err(failed)?;
+        {
+            let backup = rusqlite::backup::Backup::new(&self.connection, &mut copy).map_err(failed)?;
+            // all pages in one step: a reader's snapshot, unaffected by a writer
+            backup.step(-1).map_err(failed)?;
+        }
+        copy.execute("DELETE FROM meta WHERE key = ?1", [WRITTEN]).map_err(failed)?;
+        copy.pragma_update(None, "journal_mode", "DELETE").map_err(failed)?;
+        copy.close().map_err(|(_, error)| failed(error))?;
+        let copy = Self::open_read_only(to)?;
+        if let Some(damage) = copy.verify()?.first() {
+            let record = damage.record.map_or("the file".to_owned(), |id| format!("record {id}"));
+            return Err(
+                copy.content(format!("the copy is damaged ({record}: {}); is the original?", damage.what))
+            );
+        }
+        Ok(copy.records()?.len())
+    }
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(ending);
+    name.into()
+}
+
+/// Keys of the notes.
+const RIG: &str = "simulated_rig";
+const TRUTH: &str = "simulated_truth";
+
+/// Identifies a simulated rig.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SimulatedRig {
+    /// The rig's name.
+    pub name: String,
+    /// Its seed.
+    pub seed: u64,
+    /// SHA-256 of all its parameters, in base64; `None` in files from before this was stored.
+    #[serde(default)]
+    pub parameters: Option<String>,
+}
+
+/// Force law of the contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactLaw {
+    /// Stuck, whatever the force.
+    Linear,
+    /// One slider: stuck, then gross slip.
+    Jenkins,
+    /// Many sliders in parallel: microslip, then gross slip.
+    Iwan,
+}
+
+/// The result that an ideal measurement of the simulated rig would give. Stiffness along z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SimulatedTruth {
+    /// The contact's own tangential stiffness k_T in full stick, N/m.
+    pub contact_k_t_n_per_m: f64,
+    /// The contact's own tangential damping c_T, N s/m.
+    pub contact_c_t_n_s_per_m: f64,
+    /// Stiffness between the arms as substructuring finds it at the virtual points: contact and
+    /// clamps in series, N/m.
+    pub between_arms_k_n_per_m: f64,
+    /// Stiffness of the clamps alone, defined the same way, N/m; `None` if they are rigid.
+    pub clamps_k_n_per_m: Option<f64>,
+    /// The contact's force law.
+    pub law: ContactLaw,
+    /// μN, above which the contact is in gross slip, N; `None` for the linear law. An Iwan contact
+    /// slips partially below it.
+    pub slip_limit_n: Option<f64>,
+}
+
+/// Whether a board of this name measures a simulated rig.
+pub fn is_simulated_board(name: &str) -> bool {
+    [Info::VIRTUAL_BOARD, Info::EMULATED_BOARD].contains(&name)
+}
+
+impl Store {
+    /// Stores which simulated rig the campaign is run on, and its truth; the last session's values
+    /// count.
+    pub(crate) fn note_simulated(&self, simulated: &Simulated) -> Result<(), StoreError> {
+        let rig = SimulatedRig {
+            name: simulated.rig.clone(),
+            seed: simulated.seed,
+            parameters: Some(simulated.parameters.clone()),
+        };
+        let rig = serde_json::to_string(&rig).map_err(|error| self.content(error.to_string()))?;
+        self.set_meta(RIG, &rig)?;
+        self.set_meta(TRUTH, &simulated.truth.to_string())
+    }
+
+    /// The simulated rig that the campaign was run on; `None` if the device was not simulated in
+    /// the runner's own process.
+    ///
+    /// # Errors
+    /// The note cannot be read.
+    pub fn simulated_rig(&self) -> Result<Option<SimulatedRig>, StoreError> {
+        self.json(RIG)
+    }
+
+    /// Whether any session's device was simulated, in the runner's own process or over a
+    /// connection.
+    ///
+    /// # Errors
+    /// The notes or sessions cannot be read.
+    pub fn is_simulated(&self) -> Result<bool, StoreError> {
+        let behind_a_wire = self.sessions()?.iter().any(|(_, info)| is_simulated_board(&info.board));
+        Ok(behind_a_wire || self.simulated_rig()?.is_some())
+    }
+
+    /// The result that an ideal measurement of the simulated rig would give; `None` if the device
+    /// was not simulated in the runner's own process, and in files from before this was stored.
+    ///
+    /// # Errors
+    /// The note cannot be read.
+    pub fn simulated_truth(&self) -> Result<Option<SimulatedTruth>, StoreError> {
+        self.json(TRUTH)
+    }
+
+    fn json<T: serde::de::DeserializeOwned>(&self, key: &str) -> Result<Option<T>, StoreError> {
+        let read = |text: String| {
+            serde_json::from_str(&text).map_err(|error| self.content(format!("the note {key}: {error}")))
+        };
+        self.meta(key)?.map(read).transpose()
+    }
+}
+
+#[cfg(test)]
+#[path = "identity_tests.rs"]
+mod tests;
+
+#[cfg(test)]
+mod lock_tests {
+    use super::*;
+
+    #[test]
+    fn a_second_writer_is_refused_by_name_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let campaign = folder.path().join("a.jrig");
+        let lock = WriteLock::take(&campaign).expect("free");
+        let said = WriteLock::take(&campaign).expect_err("held").to_string();
+        assert!(said.contains(&format!("process {}", std::process::id())), "{said}");
+        drop(lock);
+        assert!(!beside(&campaign).exists());
+        // left by a process that was killed
+        std::fs::write(beside(&campaign), "process 1").expect("written");
+        drop(WriteLock::take(&campaign).expect("nobody holds it"));
+    }
+}
+
+#[cfg(test)]
+mod share_tests {
+    use super::*;
+
+    const TABLE: &str = "22 1 254:0 / / rw,relatime - ext4 /dev/vda rw\n\
+                         40 22 0:40 / /home rw - nfs4 server:/home rw,vers=4.2\n\
+                         41 40 0:41 / /home/me/lab\\040disk rw shared:5 - ext4 /dev/sdb rw\n\
+                         42 22 0:42 / /mnt/share rw - cifs //server/x rw\n\
+                         43 22 0:43 / /mnt/ssh rw - fuse.sshfs me@there:/ rw\n";
+
+    #[test]
+    fn the_file_system_that_counts_is_the_innermost() {
+        let of = |folder: &str| network(TABLE, Path::new(folder));
+        assert_eq!(of("/var/data"), None);
+        assert_eq!(of("/home/me").as_deref(), Some("nfs4"));
+        assert_eq!(of("/home/me/lab disk/2026"), None);
+        assert_eq!(of("/mnt/share").as_deref(), Some("cifs"));
+        assert_eq!(of("/mnt/sharedisk"), None);
+        assert_eq!(of("/mnt/ssh/x").as_deref(), Some("fuse.sshfs"));
+    }
 }

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use super::Store;
 use super::cell_table::CellRow;
 use super::error::StoreError;
-use super::record_row::{Damaged, RecordRow};
+use super::record_table::{Damaged, RecordRow};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::device::channels::ChannelMap;
 

@@ -6,7 +6,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::Verdict;
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use crate::device::stream::Recording;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_protocol::shot::{Phase, Shot};

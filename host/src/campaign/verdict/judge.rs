@@ -4,7 +4,7 @@ use super::others::{self, Others};
 use super::{Kind, Limits, RawHit, Verdict};
 use crate::campaign::plan::{Cell, Plan};
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use crate::device::stream::Recording;
 use jointrig_protocol::channel::{Channel, Quantity, Role};
 
 /// Judges records. It works on the raw record, before anything is derived from it.

@@ -16,7 +16,6 @@ mod clipping;
 mod double_hit;
 mod dropout;
 pub mod judge;
-mod motion;
 pub mod others;
 #[cfg(test)]
 mod synthetic_tests;

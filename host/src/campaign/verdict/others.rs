@@ -5,7 +5,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 
 use crate::campaign::plan::{Enough, Plan};
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Codes;
+use crate::device::stream::Codes;
 use crate::spectra::{CrossSpectra, Pulse, Summing, Windowing};
 
 /// Number of good records needed for a usual noise.

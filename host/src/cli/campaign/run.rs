@@ -16,10 +16,10 @@ use crate::cli::campaign::calibrate;
 use crate::cli::error::CliError;
 use crate::cli::page::Page;
 use crate::cli::plan::file as plan_file;
-use crate::cli::{interrupt, measure};
+use crate::cli::{measure, output};
 use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
-use crate::device::recording::Recording;
+use crate::device::stream::Recording;
 use crate::outside::tell_line;
 
 /// Measure what is missing in a campaign.
@@ -97,7 +97,7 @@ impl Run {
             store.calibrate(&calibrate::read(path)?, store.next_session()?, &reason)?;
         }
         self.mention_shaker(&store)?;
-        let stop = interrupt::flag();
+        let stop = output::flag();
         let mut onlooker = self.page.start(Some(&self.file), &stop, self.allows_control())?;
         let again = format!("jointrig campaign run {} --device {address}", quoted(&self.file));
         let device = measure::Device { address: &address, seed: self.seed, log_tables: self.log_tables };

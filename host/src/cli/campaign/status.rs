@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::campaign::plan::configuration_name;
-use crate::campaign::run::status::{document, refusals};
+use crate::campaign::run::progress::{document, refusals};
 use crate::campaign::run::tally::{Count, Tally};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;

@@ -8,7 +8,7 @@ use crate::campaign::recheck::recheck;
 use crate::campaign::store::Store;
 use crate::cli::error::CliError;
 use crate::cli::output;
-use crate::cli::waiting::Waiting;
+use crate::cli::output::Waiting;
 
 /// Check every checksum, and that no row was changed, added or removed by anything but jointrig;
 /// exits with 1 if anything is damaged.

@@ -1,6 +1,28 @@
 //! `export`: writes a campaign file's content in formats that other programs read.
+//!
+//! FRFs and results of the file; its records are read once if the analysis forms all requested
+//! lines.
 
-mod analysed;
+use super::analyse::write_into;
+use super::error::CliError;
+use super::output::Waiting;
+use super::{frf, output};
+use crate::analyse::{CampaignFile, KnownContact, LINES_HZ, Progress, Wanted};
+use crate::campaign::store::Store;
+use crate::campaign::store::record_table::RecordRow;
+use crate::exchange::tables_output::write_positions;
+use crate::exchange::{tables_output, uff_output, write_frf};
+use crate::frf::Frf;
+use crate::report::WithFrfs;
+use crate::structure::Structure;
+use crate::substructuring::geometry::Configuration;
+use crate::{analyse, report};
+use clap::{Args, ValueEnum};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
 #[cfg(feature = "parquet")]
 mod columns;
 #[cfg(feature = "parquet")]
@@ -8,25 +30,6 @@ mod estimates;
 mod levels;
 mod records;
 mod tables;
-
-use std::path::{Path, PathBuf};
-
-use clap::{Args, ValueEnum};
-use rayon::prelude::*;
-
-use super::analyse::write_into;
-use super::error::CliError;
-use super::{frf, output};
-use crate::analyse;
-use crate::campaign::store::Store;
-use crate::campaign::store::record_row::RecordRow;
-use crate::exchange::positions_output::write_positions;
-use crate::exchange::{tables_output, uff_output, write_frf};
-use crate::frf::Frf;
-use crate::report::WithFrfs;
-use crate::structure::Structure;
-use crate::substructuring::geometry::Configuration;
-use analysed::analysed;
 
 /// Write everything that a campaign file contains in formats for other programs.
 ///
@@ -210,4 +213,51 @@ impl Files<'_> {
             Format::Csv => tables_output::write_frf(path, frf).map_err(bad),
         }
     }
+}
+
+/// Analyses the file and returns its results, with the FRFs between two frequencies, Hz, of each
+/// structure that has any.
+pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<WithFrfs, CliError> {
+    let waiting = Waiting::of("analysing");
+    let progress = |progress: Progress| waiting.at(progress.done, progress.total);
+    let mut found = report::analysed_with_frfs(store, Wanted::default(), &progress)?;
+    if low_hz < LINES_HZ[0] || LINES_HZ[1] < high_hz {
+        (found.frfs, found.told) = measured_anew(store, [low_hz, high_hz])?;
+    }
+    let mut measured: HashMap<Structure, Frf> = std::mem::take(&mut found.frfs).into_iter().collect();
+    for structure in Structure::ALL {
+        let frf = match measured.remove(&structure) {
+            Some(frf) => Some(frf.into_band(low_hz, high_hz)),
+            None => store.frf(structure.name())?.map(|found| imported(found.frf)),
+        };
+        found.frfs.extend(Some(structure).zip(frf));
+    }
+    if found.frfs.is_empty() {
+        found.told.push("no good hit is in the file yet: there are no FRFs to export".into());
+    }
+    Ok(found)
+}
+
+/// FRFs, and messages about records that cannot be used.
+type Measured = (Vec<(Structure, Frf)>, Vec<String>);
+
+/// FRFs at lines that the analysis does not form, computed from the records.
+fn measured_anew(store: &Store, lines_hz: [f64; 2]) -> Result<Measured, CliError> {
+    let file = CampaignFile::open(store, KnownContact::default())?;
+    let (mut frfs, mut told) = (Vec::new(), Vec::new());
+    for structure in Structure::ALL {
+        let (measured, complaints) = file.measured(structure, lines_hz);
+        told.extend(complaints);
+        frfs.extend(measured.map(|(frf, _)| (structure, frf)));
+    }
+    Ok((frfs, told))
+}
+
+/// Imported FRFs; their coherence is unknown, and their variance may be.
+fn imported(frf: Frf) -> Frf {
+    let unknown =
+        vec![DMatrix::from_element(frf.outputs().len(), frf.inputs().len(), f64::NAN); frf.lines().len()];
+    let variance = frf.variance().map_or_else(|| unknown.clone(), <[_]>::to_vec);
+    let whole = frf.with_variance(variance).and_then(|frf| frf.with_coherence(unknown));
+    whole.expect("one of each was made for every value")
 }

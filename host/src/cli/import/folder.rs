@@ -11,7 +11,7 @@ use crate::campaign::store::Store;
 use crate::campaign::verdict::{Kind, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
-use crate::cli::waiting::Waiting;
+use crate::cli::output::Waiting;
 use crate::exchange::StatedUnits;
 use crate::exchange::record_uff::{LabelledRecords, by_label, read_record_file, record_contents};
 use crate::outside::tell_line;

@@ -1,7 +1,7 @@
 //! Compares two campaigns: before and after wear, under two loads, with two contacts.
 
 use crate::contact::Interval;
-use crate::report::words::comparison_sentences::{lacking, verdict};
+use crate::report::words::side_by_side::{lacking, verdict};
 use crate::results::{Compared, Difference, Force, Hysteresis, Results, VERSION};
 
 /// Relative tolerance within which two levels of the shaker count as the same: frequencies are

@@ -1,21 +1,26 @@
 //! Builds the document from the findings: every number and sentence of `results.json`.
-
-mod answer_from_findings;
-mod compared_from_results;
-mod interface_from_findings;
-mod joint_from_findings;
-mod loops_from_findings;
-mod source_from_findings;
-
-pub use compared_from_results::compare;
+//!
+//! Provenance of the results: the information in the file, and how the analysis used its records.
+//!
+//! Converts the findings on the interface to the format of the results.
 
 use super::words::{check_sentences, missing_sentences, side_by_side};
 use crate::analyse::Findings;
-use crate::results::{Results, VERSION};
+use crate::results::{InterfaceModes, MAIN_BAND, Results, Source, VERSION, VirtualPoint, ranges, rounded};
+use crate::substructuring::VirtualPointQuality;
+use crate::substructuring::cmif::Cmif;
+use serde_json::{Map, json};
+
+pub use compared_from_results::compare;
+
+mod answer_from_findings;
+mod compared_from_results;
+mod joint_from_findings;
+mod loops_from_findings;
 
 /// Builds `results.json` from all findings.
 pub fn document(found: Findings) -> Results {
-    let source = source_from_findings::source(&found);
+    let source = source(&found);
     let checks = check_sentences::all(&found);
     let missing = found.missing.iter().map(missing_sentences::sentence).collect();
     let answer = answer_from_findings::answer(&found);
@@ -39,9 +44,8 @@ pub fn document(found: Findings) -> Results {
         ..Results::default()
     };
     if let Some(of_frfs) = &found.substructured {
-        results.virtual_points =
-            of_frfs.virtual_points.iter().map(interface_from_findings::quality).collect();
-        results.interface_modes = of_frfs.cmif.as_ref().ok().map(interface_from_findings::interface_modes);
+        results.virtual_points = of_frfs.virtual_points.iter().map(quality).collect();
+        results.interface_modes = of_frfs.cmif.as_ref().ok().map(interface_modes);
         results.joint_spectrum = joint_from_findings::spectrum(of_frfs);
     }
     for measured in found.configurations {
@@ -64,6 +68,81 @@ pub fn document(found: Findings) -> Results {
     }
     results.side_by_side = side_by_side::kinds(&results);
     results
+}
+
+/// The source in the findings, with the settings of the analysis and the records used.
+pub fn source(found: &Findings) -> Source {
+    let mut source = found.source.clone();
+    let settings = &mut source.settings;
+    if let Some(of_records) = &found.settings {
+        let window = of_records.windowing;
+        settings.insert("exponential_window_per_s".into(), window.sigma_per_s.into());
+        settings.insert("force_window_s".into(), json!([-window.force_before_s, window.force_after_s]));
+        settings.insert("estimator".into(), "H1 on s = σ + iω".into());
+        settings.insert("lines_hz".into(), json!(of_records.lines_hz));
+    }
+    let mut imported = Map::new();
+    for measured in &found.configurations {
+        let records = ranges(measured.records.iter().copied());
+        if !records.is_empty() {
+            source.records.insert(measured.configuration.into(), records);
+        }
+        if let Some(from) = &measured.imported {
+            let about = json!({ "file": from.file, "imported": from.utc, "variance": from.with_variance });
+            imported.insert(measured.configuration.into(), about);
+        }
+    }
+    if !imported.is_empty() {
+        settings.insert("imported_frf".into(), imported.into());
+    }
+    if let Some(priors) = &found.priors {
+        settings.insert("priors".into(), json!(priors));
+    }
+    source
+}
+
+/// Number of CMIF curves kept: at most twelve interface motions, and the first beyond them.
+const CURVES: usize = 13;
+
+/// Quality of one virtual point.
+pub fn quality(found: &VirtualPointQuality) -> VirtualPoint {
+    let named = |names: &[String], values: &[f64]| {
+        names.iter().cloned().zip(values.iter().map(|v| rounded(*v, 6))).collect()
+    };
+    let [overall_sensor, overall_impact] = found.held_over(MAIN_BAND);
+    VirtualPoint {
+        substructure: found.substructure.into(),
+        idms: found.idms,
+        modes: found.modes.clone(),
+        condition_responses: found.condition_responses,
+        condition_impacts: found.condition_impacts,
+        overall_sensor,
+        overall_impact,
+        sensors: named(&found.channels, &found.consistency.specific_sensor),
+        impacts: named(&found.impacts, &found.consistency.specific_impact),
+        passivity: found.modes.iter().copied().zip(found.passivity.iter().copied()).collect(),
+        reciprocity: found.reciprocity,
+    }
+}
+
+/// The CMIF.
+pub fn interface_modes(found: &Cmif) -> InterfaceModes {
+    let curves = found.singular_values.iter().map(Vec::len).min().unwrap_or(0).min(CURVES);
+    InterfaceModes {
+        frequency_hz: found.frequency_hz.clone(),
+        singular_values_m_per_n: (0..curves)
+            .map(|c| found.singular_values.iter().map(|line| rounded(line[c], 4)).collect())
+            .collect(),
+        participation: found
+            .participation_over(MAIN_BAND)
+            .into_iter()
+            .take(curves)
+            .map(|parts| parts.map(|part| rounded(part, 4)))
+            .collect(),
+        explained: found.explained.clone(),
+        suggested: found.suggested,
+        reason: found.reason.clone(),
+    }
 }
 
 #[cfg(test)]

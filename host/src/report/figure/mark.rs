@@ -1,10 +1,14 @@
 //! The contents of a panel: curves, points, bands, words.
+//!
+//! Numbers of curves as compact text: `f32:` and base64 of 32-bit floats, little endian.
+//!
+//! Where the numbers of a mark are in `results.json`.
 
-use super::origin::{How, Origin, Second};
-use super::packed::Packed;
+use super::Scene;
 use super::role::Role;
-use super::scene::Scene;
-use serde::Serialize;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use serde::{Serialize, Serializer};
 
 /// One mark.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -368,4 +372,96 @@ impl Mark {
 /// The path of the object that contains a number.
 fn beside(path: &str) -> &str {
     path.rsplit_once('/').map_or(path, |(above, _)| above)
+}
+
+/// The values of a curve; NaN where unknown.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Packed(pub Vec<f32>);
+
+impl Packed {
+    /// From any sequence of numbers.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        Packed(values.into_iter().map(|v| v as f32).collect())
+    }
+
+    /// The range of the finite values.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        let finite = || self.0.iter().copied().filter(|v| v.is_finite());
+        let low = finite().reduce(f32::min)?;
+        Some([low.into(), finite().fold(low, f32::max).into()])
+    }
+}
+
+impl Serialize for Packed {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let bytes: Vec<u8> = self.0.iter().flat_map(|v| v.to_le_bytes()).collect();
+        to.serialize_str(&format!("f32:{}", BASE64_STANDARD.encode(bytes)))
+    }
+}
+
+/// A number with six significant digits, as used in csv files and readouts; empty if it is not
+/// finite.
+pub fn six_digits(value: f64) -> String {
+    if !value.is_finite() {
+        return String::new();
+    }
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    if rounded != 0.0 && !(1e-4..1e9).contains(&rounded.abs()) {
+        format!("{rounded:e}")
+    } else {
+        rounded.to_string()
+    }
+}
+
+/// Where the numbers of a mark are in `results.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Origin {
+    /// Which of the mark's lists: `x`, `y`, `low`, `high`, `values`; `first` and `step` of regular
+    /// positions; `at` of a level.
+    pub of: &'static str,
+    /// The path; `*` stands for any key or index.
+    pub path: String,
+    /// Factor by which the numbers there were multiplied for the unit shown.
+    pub factor: f64,
+    /// A second number that was combined with them before that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub with: Option<Second>,
+}
+
+/// The second number of a sum or quotient, as in `mean ± σ`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Second {
+    /// The operation.
+    pub how: How,
+    /// Its path, with as many `*` as the first one's.
+    pub path: String,
+}
+
+/// Operation applied with a second number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum How {
+    /// The second number was added.
+    Plus,
+    /// The second number was subtracted.
+    Minus,
+    /// The first was multiplied by it.
+    Times,
+    /// The first was divided by it.
+    Per,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn six_digits_survive_thirty_two_bits() {
+        for value in [1.234_56e-9, 26.889_5, 999_999.0, -0.000_123_456] {
+            assert_eq!(six_digits(f64::from(value as f32)), six_digits(value));
+        }
+        assert_eq!(six_digits(f64::NAN), "");
+        assert_eq!(six_digits(1.234_567e-8), "1.23457e-8");
+        assert_eq!(serde_json::to_string(&Packed::of([1.0])).expect("text"), "\"f32:AACAPw==\"");
+    }
 }

@@ -8,30 +8,18 @@ mod backbone;
 mod band_means;
 mod budget;
 mod cells;
-mod coherence;
 mod comparison;
 mod consistency;
 mod contact_loop;
-mod decay_loops;
-mod frf_matrix;
-mod geometry;
-mod impacts;
-mod interface_modes;
 mod joint_spectrum;
 mod levels;
-mod loop_parts;
 mod noise_floor;
-mod participation;
-mod pulses;
-mod random_error;
-mod rebuilt;
 mod receptances;
 mod shaker_loops;
 mod specimens;
-mod usable_bands;
 
-pub use frf_matrix::frf_matrix;
-pub use geometry::geometry;
+pub use cells::geometry;
+pub use receptances::frf_matrix;
 
 use super::figure::{Figure, Panel, Source};
 use crate::results::Results;
@@ -85,26 +73,21 @@ pub const ALL: &[Entry] = &[
     entry(Chapter::Answer, "The answer", "an identified stiffness", answer::answer),
     entry(Chapter::SideBySide, "Every method side by side", ALL_THREE, comparison::comparison),
     entry(Chapter::SideBySide, "What makes the interval of k_T", "an identified k_T", budget::budget),
-    entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, geometry::of_results),
+    entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, cells::of_results),
     entry(Chapter::Measured, "Every cell", CAMPAIGN, cells::cells),
-    entry(Chapter::Measured, "Coherence of every cell", "two hits or more in a cell", coherence::coherence),
-    entry(
-        Chapter::Measured,
-        "Random error by cell",
-        "two hits or more in a cell",
-        random_error::random_error,
-    ),
-    entry(Chapter::Measured, "The hammer over the campaign", CAMPAIGN, pulses::pulses),
-    entry(Chapter::Measured, "The usable band", CAMPAIGN, usable_bands::usable_bands),
+    entry(Chapter::Measured, "Coherence of every cell", "two hits or more in a cell", noise_floor::coherence),
+    entry(Chapter::Measured, "Random error by cell", "two hits or more in a cell", noise_floor::random_error),
+    entry(Chapter::Measured, "The hammer over the campaign", CAMPAIGN, noise_floor::pulses),
+    entry(Chapter::Measured, "The usable band", CAMPAIGN, noise_floor::usable_bands),
     entry(Chapter::Joint, "Joint stiffness over frequency", ALL_THREE, joint_spectrum::joint_spectrum),
-    entry(Chapter::Joint, "What coupling adds", ALL_THREE, interface_modes::interface_modes),
-    entry(Chapter::Joint, "Which motions couple", ALL_THREE, participation::participation),
+    entry(Chapter::Joint, "What coupling adds", ALL_THREE, consistency::interface_modes),
+    entry(Chapter::Joint, "Which motions couple", ALL_THREE, consistency::participation),
     entry(Chapter::Joint, "Means over two bands", ALL_THREE, band_means::band_means),
     entry(Chapter::Joint, "Consistency of the virtual points", ALL_THREE, consistency::consistency),
-    entry(Chapter::Loops, "A loop and its parts", LEVELS, loop_parts::loop_parts),
+    entry(Chapter::Loops, "A loop and its parts", LEVELS, contact_loop::loop_parts),
     entry(Chapter::Loops, "One impact at the contact", IMPACTS, contact_loop::contact_loop),
-    entry(Chapter::Loops, "The first, third and fourth cycle", IMPACTS, decay_loops::decay_loops),
-    entry(Chapter::Loops, "The slope of every impact", IMPACTS, impacts::impacts),
+    entry(Chapter::Loops, "The first, third and fourth cycle", IMPACTS, contact_loop::decay_loops),
+    entry(Chapter::Loops, "The slope of every impact", IMPACTS, cells::impacts),
     entry(Chapter::Loops, "The shaker's levels", LEVELS, levels::levels),
     entry(Chapter::Loops, "Loops of the shaker", LEVELS, shaker_loops::shaker_loops),
     entry(
@@ -118,7 +101,7 @@ pub const ALL: &[Entry] = &[
         Chapter::Loops,
         "The decay put together from two sinusoids",
         "hits on the assembly in which a resonance of one specimen hides",
-        rebuilt::rebuilt,
+        contact_loop::rebuilt,
     ),
     entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
     entry(

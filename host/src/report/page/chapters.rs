@@ -2,7 +2,7 @@
 //! need, and provenance.
 
 use super::figure_html;
-use super::glossary_html;
+use super::text;
 use super::text::Html;
 use crate::report::figure::Figure;
 use crate::report::figures::{Chapter, Entry};
@@ -65,7 +65,7 @@ pub fn all(html: &mut Html, results: &Results, drawn: &Drawn<'_>) {
         html.raw(&table);
     }
     html.raw("</section><section id=\"glossary\"><h2>Words</h2>");
-    glossary_html::list(html);
+    text::list(html);
     html.raw("</section>");
 }
 

@@ -2,7 +2,7 @@
 //! by side with the same axes.
 
 use super::text::Html;
-use super::{figure_html, glossary_html, shell};
+use super::{figure_html, shell, text};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Source};
 use crate::report::figures;
 use crate::report::tables;
@@ -46,7 +46,7 @@ pub fn comparison_page(compared: &Compared, both: [&Results; 2]) -> String {
         figure_html::figure(&mut body, figure, 3);
     }
     body.raw("</section><section id=\"glossary\"><h2>Words</h2>");
-    glossary_html::list(&mut body);
+    text::list(&mut body);
     body.raw("</section></main>");
     shell("Two contacts compared", &banner, simulated, &body.finish(), drawn.iter())
 }

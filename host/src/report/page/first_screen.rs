@@ -5,7 +5,7 @@ use super::figure_html;
 use super::text::{Html, escaped};
 use crate::report::figure::Figure;
 use crate::report::figures::{Chapter, Entry};
-use crate::report::words::line::{Line, UNKNOWN};
+use crate::report::words::number::{Line, UNKNOWN};
 use crate::report::words::{self, answer_sentences, brief};
 use crate::results::Results;
 

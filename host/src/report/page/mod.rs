@@ -1,23 +1,25 @@
 //! The page: the answer, then figures and tables by chapter, in one HTML text without external
 //! resources.
-
-mod chapters;
-mod comparison_page;
-mod figure_html;
-mod first_screen;
-mod glossary_html;
-mod linked_words;
-mod policy;
-mod text;
+//!
+//! Content security policy: the page may run its one script, use its one style sheet, and load
+//! nothing else.
 
 use super::figure::{Figure, role};
 use super::figures;
 use super::words::brief;
 use crate::results::Results;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use sha2::{Digest, Sha256};
 
 pub use comparison_page::comparison_page;
-
 pub(super) use text::{Html, escaped};
+
+mod chapters;
+mod comparison_page;
+mod figure_html;
+mod first_screen;
+mod text;
 
 const STYLE: &str = include_str!("page.css");
 const CHARTS_STYLE: &str = include_str!("../../../vendor/uplot/uPlot.min.css");
@@ -61,13 +63,13 @@ fn shell<'a>(
     let (style, script) = (chart_style(), script(PAGE_SCRIPT));
     let mut html = Html::default();
     html.raw("<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">");
-    html.raw(&policy::meta(&style, &script));
+    html.raw(&meta(&style, &script));
     html.element("title", title);
     html.raw(&format!("<style>{style}</style></head><body>"));
     html.raw(if simulated { "<header class=\"banner simulated\">" } else { "<header class=\"banner\">" });
     html.element("p", banner);
     html.raw("<div class=\"tools\" id=\"page-tools\"></div></header><div class=\"frame\">");
-    html.raw(&linked_words::linked(body));
+    html.raw(&text::linked(body));
     html.raw("</div>");
     figure_html::data(&mut html, figures);
     html.raw(&format!("<script>{script}</script></body></html>\n"));
@@ -97,6 +99,16 @@ pub fn chart_style() -> String {
         "{CHARTS_STYLE}\n:root{{{light}}}\n@media(prefers-color-scheme:dark){{:root:not([data-light=light]){{{dark}}}}}\n:root[data-light=dark]{{{dark}}}\n\
          @media print{{:root:root:root{{{light}}}}}\n{}{STYLE}",
         role::classes()
+    )
+}
+
+/// The policy as a meta element; the hashes are those of these texts.
+pub fn meta(style: &str, script: &str) -> String {
+    let hash = |text: &str| BASE64_STANDARD.encode(Sha256::digest(text.as_bytes()));
+    format!(
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src data: blob:\">",
+        hash(script),
+        hash(style)
     )
 }
 

@@ -1,8 +1,9 @@
 //! Draws the marks of a panel. `page/marks.js` does the same in the page.
+//!
+//! The marker of a single point.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::place::Place;
-use super::sign::{self, RADIUS};
+use super::scene::Place;
 use crate::report::figure::{Along, Bars, Mark, Marker, Packed, Role, Shape};
 
 /// Draws one mark; the caller clips what lies outside the frame.
@@ -28,7 +29,7 @@ pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
                     bar(drawing, place, bars, i, at, *aside, stroke);
                 }
                 if let Some(at) = inside(place, at) {
-                    sign::marker(drawing, [at[0] + aside, at[1]], role, *marker);
+                    marker(drawing, [at[0] + aside, at[1]], role, *marker);
                 }
             }
         }
@@ -198,5 +199,30 @@ fn strips(drawing: &mut Drawing, place: &Place, fill: &str, x: &Packed, values: 
             }
         }
         drawing.fills(&areas, fill, opacity);
+    }
+}
+
+/// Radius of a point, px.
+pub const RADIUS: f64 = 4.0;
+
+/// Draws the marker of a point.
+pub fn marker(drawing: &mut Drawing, at: [f64; 2], role: Role, marker: Marker) {
+    let name = role.name();
+    let stroke = format!("s-{name}");
+    match marker {
+        Marker::Dot => drawing.dot(at, RADIUS, &format!("f-{name} s-{name}")),
+        Marker::Ring => drawing.dot(at, RADIUS, &format!("paper s-{name}")),
+        Marker::Square => drawing.square(at, RADIUS, &format!("f-{name} s-{name}")),
+        Marker::Frame => drawing.square(at, RADIUS, &format!("paper s-{name}")),
+        Marker::Stroke => {
+            drawing.line([at[0], at[1] - 7.0], [at[0], at[1] + 7.0], Stroke::new(&stroke, 1.6));
+        }
+        Marker::Cross => {
+            for side in [-1.0, 1.0] {
+                let (a, b) =
+                    ([at[0] - RADIUS, at[1] - side * RADIUS], [at[0] + RADIUS, at[1] + side * RADIUS]);
+                drawing.line(a, b, Stroke::new(&stroke, 1.8));
+            }
+        }
     }
 }

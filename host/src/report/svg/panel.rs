@@ -1,7 +1,7 @@
 //! One panel as a drawing: frame, grid, ticks, and contents.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::place::Place;
+use super::scene::Place;
 use super::{marks, scene};
 use crate::report::figure::{Axis, Height, Panel, Shape};
 use crate::report::scale::{Lie, Scale, Tick};

@@ -1,8 +1,11 @@
 //! A scene in space, seen from one side; the page can rotate it (`page/scene.js` draws the same).
+//!
+//! Maps a panel's values to positions on the drawing.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::sign;
+use super::marks;
 use crate::report::figure::{Body, Marker, Scene};
+use crate::report::scale::Scale;
 
 /// Initial viewing direction, rad: about the vertical, then down from the horizontal.
 const YAW: f64 = 0.7;
@@ -57,7 +60,7 @@ pub fn draw(drawing: &mut Drawing, area: Area, scene: &Scene) {
             drawing.line(at(from), place, Stroke::new(&class, 2.0));
         }
         let marker = if spot.toward.is_some() { Marker::Dot } else { Marker::Frame };
-        sign::marker(drawing, place, spot.role, marker);
+        marks::marker(drawing, place, spot.role, marker);
         let width = 6.8 * spot.name.chars().count() as f64;
         let places =
             [[7.0, -5.0], [7.0, 14.0], [-7.0 - width, -5.0], [-7.0 - width, 14.0], [7.0, -17.0], [7.0, 26.0]];
@@ -96,4 +99,14 @@ fn corners_of(body: &Body) -> [[f64; 3]; 8] {
     std::array::from_fn(|i| {
         std::array::from_fn(|axis| if i >> axis & 1 == 1 { body.high[axis] } else { body.low[axis] })
     })
+}
+
+/// A panel with its frame and axes in pixels.
+pub struct Place {
+    /// The frame.
+    pub area: Area,
+    /// The horizontal axis.
+    pub x: Scale,
+    /// The vertical axis.
+    pub y: Scale,
 }

@@ -1,6 +1,6 @@
 //! The answer in words: what an engineer would say about each number.
 
-use super::line::{BETWEEN, CLAMP, CONTACT, Line};
+use super::number::{BETWEEN, CLAMP, CONTACT, Line};
 use super::number::{micro, short};
 use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};

@@ -2,7 +2,7 @@
 //! the terminal's output.
 
 use super::answer_sentences::{why_they_differ, with_interval};
-use super::line::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
+use super::number::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN};
 use super::number::{decimals, micro, short};
 use crate::campaign::store::session_table::SessionInfo;
 use crate::results::{

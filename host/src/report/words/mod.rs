@@ -4,14 +4,11 @@
 pub(super) mod answer_sentences;
 pub mod brief;
 pub(super) mod check_sentences;
-pub(super) mod comparison_sentences;
 pub mod headline;
 pub(super) mod level_sentences;
-pub mod line;
 pub(super) mod missing_sentences;
 mod names;
 pub mod number;
-mod record_loops;
 pub mod side_by_side;
 mod summary;
 pub(super) mod warning_sentences;

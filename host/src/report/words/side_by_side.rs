@@ -1,11 +1,14 @@
 //! FBS and loops side by side (the paper's Tables 2 and 3): every type of stiffness that was found,
 //! and its meaning.
+//!
+//! Sentences for the comparison of two campaigns.
 
+use super::level_sentences::slope_name;
 use super::names::{BETWEEN_SPOTS, slope};
 use super::number::{band, count, decimals, short};
-use super::record_loops::slope_name;
+use crate::contact::Interval;
 use crate::results::{
-    DIRECT, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
+    DIRECT, Difference, Excitation, Force, HIDDEN_RESONANCE, Hysteresis, MAIN_BAND, OverCycles, Results,
     SERIES_COMPLIANCE, Shape, SideBySide as Kind,
 };
 use crate::substructuring::{Dof, fit};
@@ -198,6 +201,51 @@ fn pooled(slopes: &[OverCycles]) -> Option<(f64, f64)> {
     (!slopes.is_empty()).then(|| (mean, variance.sqrt()))
 }
 
+/// Whether the contacts differ, by the quantity that decides it; a fixed sentence if neither
+/// quantity is known in both.
+pub fn verdict(told: Option<&Difference>) -> String {
+    told.map_or_else(
+        || {
+            "Nothing tells whether the contacts differ: neither k_T nor the stiffness between the arms is known in both."
+                .into()
+        },
+        of_difference,
+    )
+}
+
+/// Sentence for a quantity that one of the two lacks.
+pub fn lacking(quantity: &str, which: &str) -> String {
+    format!("{quantity}: the {which} campaign has none")
+}
+
+fn of_difference(d: &Difference) -> String {
+    let micro = |k: f64| 1e-6 * k;
+    let Interval { mean, ci95: [low, high] } = d.b_minus_a;
+    let part = 100.0 * mean / d.a.mean;
+    if d.differ {
+        let way = if mean > 0.0 { "stiffer" } else { "softer" };
+        // the smaller change first, whatever its sign
+        let [near, far] = if mean > 0.0 { [low, high] } else { [-high, -low] };
+        format!(
+            "They differ: {}, the second is {way} by {:.1} N/µm (95 % {:.1}…{:.1}), {:.0} % of the first.",
+            d.quantity,
+            micro(mean.abs()),
+            micro(near),
+            micro(far),
+            part.abs()
+        )
+    } else {
+        format!(
+            "They do not differ as far as this measurement tells: {}, second minus first is {:.1} N/µm (95 % {:.1}…{:.1}).",
+            d.quantity,
+            micro(mean),
+            micro(low),
+            micro(high)
+        )
+    }
+    .replace('-', "−")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,5 +270,27 @@ mod tests {
         assert_eq!(pooled(&[one(100.0)]), Some((100.0, 3.0)));
         assert_eq!(pooled(&[one(96.0), one(104.0)]), Some((100.0, 5.0)));
         assert_eq!(pooled(&[]), None);
+    }
+}
+
+#[cfg(test)]
+mod comparison_sentences_tests {
+    use super::*;
+
+    fn difference(mean: f64, differ: bool) -> Difference {
+        let a = Interval { mean: 180e6, ci95: [174e6, 186e6] };
+        let b = Interval { mean: 180e6 + mean, ci95: [174e6 + mean, 186e6 + mean] };
+        let b_minus_a = Interval { mean, ci95: [mean - 7.8e6, mean + 7.8e6] };
+        Difference { quantity: "k_T".into(), unit: "N/m", a, b, b_minus_a, differ }
+    }
+
+    #[test]
+    fn the_smaller_change_comes_first_whichever_way_it_goes() {
+        let softer = verdict(Some(&difference(-18e6, true)));
+        assert!(softer.contains("softer by 18.0 N/µm (95 % 10.2…25.8), 10 %"), "{softer}");
+        let stiffer = verdict(Some(&difference(18e6, true)));
+        assert!(stiffer.contains("stiffer by 18.0 N/µm (95 % 10.2…25.8), 10 %"), "{stiffer}");
+        let same = verdict(Some(&difference(-3e6, false)));
+        assert!(same.contains("do not differ") && same.contains("−3.0 N/µm (95 % −10.8…4.8)"), "{same}");
     }
 }

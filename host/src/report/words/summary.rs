@@ -1,8 +1,8 @@
 //! The same results in plain sentences, for the terminal and the head of the report.
 
+use super::level_sentences::{record_loops, slope_name};
 use super::names::{method, slope, static_arm};
 use super::number::{band, count, micro, short, stiffness};
-use super::record_loops::{record_loops, slope_name};
 use super::{answer_sentences, side_by_side};
 use crate::results::{Bootstrap, Excitation, Force, Hysteresis, Joint, MAIN_BAND, RECORD, Results, Shape};
 use crate::substructuring::{Dof, fit};

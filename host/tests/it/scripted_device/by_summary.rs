@@ -7,7 +7,7 @@ use jointrig::campaign::verdict::judge::Judge;
 use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::device::channels::ChannelMap;
-use jointrig::device::recording::Recording;
+use jointrig::device::stream::Recording;
 
 /// Judges by the device's own summary of the shot and by the range of the codes; needs no signal
 /// processing.

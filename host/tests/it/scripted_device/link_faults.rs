@@ -16,7 +16,7 @@ use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Kind, Verdict};
 use jointrig::campaign::watch::{Seen, Watch, Watchers};
 use jointrig::device::channels::ChannelMap;
-use jointrig::device::recording::Recording;
+use jointrig::device::stream::Recording;
 
 /// 56 hits in seven cells.
 fn long_plan() -> String {

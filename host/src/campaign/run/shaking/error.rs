@@ -5,7 +5,7 @@ use jointrig_protocol::channel::Role;
 use jointrig_protocol::event::Reason;
 use jointrig_protocol::limits::SHAKE_SCANS_PER_CYCLE;
 
-use super::options::Options;
+use super::Options;
 use crate::campaign::plan::level::Held;
 use crate::campaign::store::error::StoreError;
 use crate::device::channels::ChannelMap;

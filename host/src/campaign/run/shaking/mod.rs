@@ -5,41 +5,50 @@
 //! device's clock and is renewed every three (`order`); an interrupt, an error and the end of the
 //! session bring the shaker to rest. Levels that are already in the file are skipped, so an
 //! interrupted run is resumed by running it again.
+//!
+//! Measures the amplitude of the controlled quantity from the samples, and decides whether it has
+//! settled.
+//!
+//! A stored level as a hysteresis record: only scales, sums and delays are applied.
+//!
+//! A sweep: the frequency changes in small steps with continuous phase.
+//!
+//! The record of a sweep spans from rest to rest, so that the ratio of its spectra is the
+//! structure's FRF, independent of the sweep rate and of the steps.
+//!
+//! How levels are measured, and the limits that stop the shaker.
 
-mod error;
-mod meter;
-mod options;
-mod order;
-mod signals;
-mod sweep;
+use super::answers::Edits;
+use super::pulse::with_sensors;
+use super::stage::same_or_accepted;
+use crate::campaign::plan::Plan;
+use crate::campaign::plan::level::{Held, Level, Moment};
+use crate::campaign::store::Store;
+use crate::campaign::store::is_simulated_board;
+use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
+use crate::campaign::store::record_table::Samples;
+use crate::campaign::store::session_table::SessionInfo;
+use crate::campaign::store::stored::Hex;
+use crate::campaign::watch::{Seen, Shaking, Watchers};
+use crate::device::channels::ChannelMap;
+use crate::device::session::Session;
+use crate::device::stream::by_channel;
+use crate::hysteresis::record::in_step;
+use crate::hysteresis::{HysteresisRecord, RelativeMotion};
+use jointrig_protocol::answer::Info;
+use jointrig_protocol::channel::{Quantity, Role};
+use jointrig_protocol::request::{Configuration, Stage as StageRequest};
+use num_complex::Complex;
+use order::Orders;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use error::{ShakeError, Shortfall};
-pub use meter::CRITERION;
-pub(in crate::campaign) use meter::Meter;
-pub use options::{Limits, Onlookers, Options};
-pub use signals::{Unusable, record};
 
-use std::sync::atomic::Ordering;
-
-use jointrig_protocol::answer::Info;
-use jointrig_protocol::channel::Role;
-use jointrig_protocol::request::{Configuration, Stage as StageRequest};
-
-use super::fit::with_sensors;
-use super::structure::same_or_accepted;
-use crate::campaign::plan::Plan;
-use crate::campaign::plan::level::Level;
-use crate::campaign::store::Store;
-use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
-use crate::campaign::store::session_table::SessionInfo;
-use crate::campaign::store::simulated::is_simulated_board;
-use crate::campaign::store::stored::Hex;
-use crate::campaign::watch::{Seen, Shaking};
-use crate::device::channels::ChannelMap;
-use crate::device::recording::by_channel;
-use crate::device::session::Session;
-use meter::{SETTLED_WINDOWS, WITHIN, is_settled};
-use order::Orders;
+mod error;
+mod order;
 
 /// Longest settling time of a level, s of the device's clock.
 const SETTLE_BOUND_S: f64 = 40.0;
@@ -341,7 +350,7 @@ impl Bench<'_> {
         if let Some(end_hz) = level.end_hz {
             let last = amplitudes.last().copied().unwrap_or(0.0);
             let settled = Settled { reached: last, overshoot: largest / level.amplitude, after_s, drive_v };
-            sweep::go(self.session, &mut orders, [level.frequency_hz, end_hz], options.sweep_hz_per_s)?;
+            go(self.session, &mut orders, [level.frequency_hz, end_hz], options.sweep_hz_per_s)?;
             return Ok(Taken { first_scan: before, scans: 0, settled });
         }
         let cycles = (options.seconds * level.frequency_hz).ceil().max(FEWEST_CYCLES);
@@ -386,5 +395,346 @@ impl Bench<'_> {
         let _ = self.session.shaker_stopped();
         let next = self.session.status()?.next_scan + pause;
         Ok(self.session.wait_for(next)?)
+    }
+}
+
+/// Shortest window, s.
+const WINDOW_S: f64 = 0.1;
+
+/// Minimum number of cycles in a window.
+const WINDOW_CYCLES: f64 = 3.0;
+
+/// Number of consecutive windows that must agree.
+pub const SETTLED_WINDOWS: usize = 6;
+
+/// Relative deviation of each window from the ordered amplitude.
+pub const WITHIN: f64 = 0.02;
+
+/// Relative deviation of the later half's mean from the earlier half's.
+const DRIFT: f64 = 0.01;
+
+/// The criterion for settled, as text.
+pub const CRITERION: &str = "settled: six windows of 0.1 s in a row within 2 % of the order, their later half within 1 % of the earlier";
+
+/// Whether the last windows satisfy the criterion. Without a target (open-loop drive) they must
+/// agree with each other.
+pub fn is_settled(amplitudes: &[f64], target: Option<f64>) -> bool {
+    let Some(from) = amplitudes.len().checked_sub(SETTLED_WINDOWS) else { return false };
+    let last = &amplitudes[from..];
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let level = target.unwrap_or_else(|| mean(last));
+    let (early, late) = last.split_at(SETTLED_WINDOWS / 2);
+    level > 0.0
+        && last.iter().all(|a| (a / level - 1.0).abs() < WITHIN)
+        && (mean(late) - mean(early)).abs() < DRIFT * level
+}
+
+/// One term of the measured quantity: index in the scan, SI units per code, and the phase
+/// correction for its delay.
+type Term = (usize, Complex<f64>);
+
+/// A lock-in amplifier for the controlled quantity.
+pub struct Meter {
+    terms: Vec<Term>,
+    frequency_hz: f64,
+    turn_per_scan: f64,
+    cycle_scans: f64,
+}
+
+impl Meter {
+    /// Creates a meter for the channels of this device; with an open-loop drive, it measures the
+    /// specimens' relative displacement to determine whether the structure has settled.
+    pub fn new(channels: &ChannelMap, held: Held, frequency_hz: f64) -> Self {
+        let omega = TAU * frequency_hz;
+        let term = |role: Role, gain: f64| {
+            channels.place(role).map(|place| {
+                let channel = &channels.channels[place];
+                let late_s = f64::from(channel.delay_ns) * 1e-9;
+                (place, Complex::from_polar(gain * channel.units_per_code(), omega * late_s))
+            })
+        };
+        let terms = match held {
+            Held::Force => vec![term(Role::Excitation, 1.0)],
+            Held::Displacement | Held::Drive => {
+                vec![term(Role::SpecimenA, 1.0 / omega), term(Role::SpecimenB, -1.0 / omega)]
+            }
+        };
+        let rate_hz = f64::from(channels.rate_hz);
+        Self {
+            terms: terms.into_iter().flatten().collect(),
+            frequency_hz,
+            turn_per_scan: omega / rate_hz,
+            cycle_scans: rate_hz / frequency_hz,
+        }
+    }
+
+    /// Scans of one window: whole cycles, rounded to scans.
+    pub fn window_scans(&self) -> u64 {
+        let cycles = (WINDOW_S * self.frequency_hz).ceil().max(WINDOW_CYCLES);
+        (cycles * self.cycle_scans).round() as u64
+    }
+
+    /// Amplitude in these codes (interleaved scan by scan): m for velocities, N for a force.
+    pub fn amplitude(&self, codes: &[i16], channels: usize) -> f64 {
+        let scans = codes.len() / channels;
+        let cycles = (scans as f64 / self.cycle_scans).floor();
+        let whole = ((cycles * self.cycle_scans).round() as usize).min(scans);
+        let sum: Complex<f64> = self
+            .terms
+            .iter()
+            .map(|(place, unit)| {
+                let at = |scan: usize| f64::from(codes[scan * channels + place]);
+                let mean = (0..whole).map(at).sum::<f64>() / whole.max(1) as f64;
+                let tone: Complex<f64> = (0..whole)
+                    .map(|scan| Complex::cis(-self.turn_per_scan * scan as f64) * (at(scan) - mean))
+                    .sum();
+                unit * tone
+            })
+            .sum();
+        2.0 * sum.norm() / whole.max(1) as f64
+    }
+}
+
+/// Why a level's channels do not yield a hysteresis record.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("its session has no {0}")]
+pub struct Unusable(&'static str);
+
+/// v_A, v_B and the load cells' sum, aligned in time; `cells` are
+/// [`Plan::load_cells`](crate::campaign::plan::Plan::load_cells).
+///
+/// # Errors
+/// A channel is missing.
+pub fn record(
+    channels: &ChannelMap,
+    cells: &[(usize, f64)],
+    samples: &Samples,
+    level: &Level,
+) -> Result<HysteresisRecord, Unusable> {
+    let velocity = |role: Role, name: &'static str| {
+        channels
+            .place(role)
+            .filter(|place| channels.channels[*place].quantity == Quantity::Velocity)
+            .ok_or(Unusable(name))
+    };
+    let a = velocity(Role::SpecimenA, "velocity of specimen A")?;
+    let b = velocity(Role::SpecimenB, "velocity of specimen B")?;
+    let (first, _) = *cells.first().ok_or(Unusable("load cell along the sliding direction"))?;
+    let late = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
+    let fs_hz = f64::from(channels.rate_hz);
+    let signals = [&[(a, 1.0)][..], &[(b, 1.0)], cells].map(|places| sum(channels, samples, places));
+    // all load cells share one amplifier and have the same delay
+    let [a_m_per_s, b_m_per_s, force_n] = in_step(signals, [late(a), late(b), late(first)], fs_hz);
+    Ok(HysteresisRecord {
+        fs_hz,
+        motion: RelativeMotion::Velocity { a_m_per_s, b_m_per_s },
+        force_n,
+        excitation_hz: level.end_hz.is_none().then_some(level.frequency_hz),
+        normal_load_n: None,
+    })
+}
+
+/// Samples converted per step, so that a sum of channels stays in the core's cache.
+const CHUNK: usize = 1 << 14;
+
+/// The sum of these channels in SI units, each weighted by its factor, computed on all cores.
+fn sum(channels: &ChannelMap, samples: &Samples, places: &[(usize, f64)]) -> Vec<f64> {
+    let Some((first, _)) = places.first() else { return Vec::new() };
+    let mut sum = vec![0.0; samples.channel(*first).len()];
+    sum.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sum)| {
+        for (n, (place, part)) in places.iter().enumerate() {
+            let Some(channel) = channels.channels.get(*place) else { continue };
+            let scale = channel.units_per_code() * part;
+            let codes = &samples.channel(*place)[chunk * CHUNK..];
+            let cell = |code: &i16| f64::from(*code) * scale;
+            let pairs = sum.iter_mut().zip(codes);
+            if n == 0 {
+                // write without reading: reading fresh memory before the first write maps each page
+                // twice, with an interrupt to every core
+                pairs.for_each(|(sum, code)| *sum = 0.0 + cell(code));
+            } else {
+                pairs.for_each(|(sum, code)| *sum += cell(code));
+            }
+        }
+    });
+    sum
+}
+
+/// Time at one frequency, s: the device's lock-in measures over 80 ms and restarts with each order.
+const STEP_S: f64 = 0.12;
+
+/// Sweeps from the first to the last frequency (Hz) at `hz_per_s`.
+///
+/// # Errors
+/// The user interrupts, the shaker stopped, or the device is disconnected.
+pub fn go(
+    session: &mut Session,
+    orders: &mut Orders,
+    [first_hz, last_hz]: [f64; 2],
+    hz_per_s: f64,
+) -> Result<(), ShakeError> {
+    let rate_hz = orders.rate_hz();
+    let steps = ((last_hz - first_hz).abs() / (hz_per_s * STEP_S)).ceil().max(1.0) as u64;
+    let begun = session.expected()?;
+    for step in 1..=steps {
+        orders.tune(session, first_hz + (last_hz - first_hz) * step as f64 / steps as f64)?;
+        orders.go_on(session, begun + (step as f64 * STEP_S * rate_hz) as u64)?;
+    }
+    Ok(())
+}
+
+/// Fraction of full scale at which load cells and excitation stop the shaker. The vibrometers do
+/// not stop it: they briefly exceed their range when a contact slips, and the device controls the
+/// quantity that they measure.
+const OF_FULL_SCALE: f64 = 0.95;
+
+/// How levels are measured.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The levels, in order.
+    pub levels: Vec<Level>,
+    /// Before or after the hammer's cells.
+    pub moment: Moment,
+    /// Shortest record, s; it is extended to whole cycles, at least twenty.
+    pub seconds: f64,
+    /// Rate of a sweep, Hz/s.
+    pub sweep_hz_per_s: f64,
+    /// The drive's largest amplitude, V; its full scale if absent.
+    pub most_drive_v: Option<f64>,
+    /// Limits that stop the shaker.
+    pub limits: Limits,
+    /// Continue even if device or rig indicate another structure than that of the file's records.
+    pub new_structure: bool,
+    /// Set to bring the shaker to rest and end the run.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// Observers and editors; none by default.
+#[derive(Clone, Debug, Default)]
+pub struct Onlookers {
+    /// The observers.
+    pub watch: Watchers,
+    /// Changes to the file that persons request during the run; carried out between two levels.
+    pub edits: Option<Edits>,
+}
+
+/// Limits by channel name, SI units; they apply throughout a level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Limits(pub Vec<(String, f64)>);
+
+impl Limits {
+    /// The limit of each channel, in the order of the scan; 0 for no limit.
+    pub fn of(&self, channels: &ChannelMap) -> Vec<f64> {
+        (0..channels.len())
+            .map(|place| {
+                let channel = &channels.channels[place];
+                let own = self.0.iter().find(|(name, _)| name == channel.name.as_str());
+                match channel.role {
+                    _ if own.is_some() => own.map_or(0.0, |(_, limit)| *limit),
+                    Role::LoadCell | Role::Excitation => {
+                        OF_FULL_SCALE * channels.full_scale(place).unwrap_or(0.0)
+                    }
+                    _ => 0.0,
+                }
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointrig_protocol::channel::{Channel, Quantity};
+
+    fn map() -> ChannelMap {
+        let channel = |name: &str, role, quantity, scale, delay_ns| Channel {
+            name: name.parse().expect("short"),
+            role,
+            quantity,
+            units_per_volt: scale,
+            range_v: 10.0,
+            delay_ns,
+            bits: 16,
+        };
+        ChannelMap {
+            id: 0,
+            rate_hz: 51_200,
+            exact_hz: None,
+            channels: vec![
+                channel("a", Role::SpecimenA, Quantity::Velocity, 1e-3, 20_000),
+                channel("b", Role::SpecimenB, Quantity::Velocity, -1e-3, 0),
+                channel("f", Role::Excitation, Quantity::Force, 44.6, 0),
+            ],
+        }
+    }
+
+    /// x_A = 0.2 µm at 0°, x_B = 0.1 µm at 60°: their difference is 0.173 µm, independent of the
+    /// effect of delays and polarity on the codes.
+    #[test]
+    fn the_relative_displacement_is_measured_whatever_delay_and_polarity() {
+        let map = map();
+        for frequency_hz in [100.0, 187.3, 302.0] {
+            let omega = TAU * frequency_hz;
+            let meter = Meter::new(&map, Held::Displacement, frequency_hz);
+            let scans = meter.window_scans();
+            assert!(scans > 5_100);
+            let velocity = |place: usize, amplitude: f64, phase: f64, scan: u64| {
+                let channel = &map.channels[place];
+                let t = scan as f64 / 51_200.0 - f64::from(channel.delay_ns) * 1e-9;
+                (amplitude * omega * (omega * t + phase).cos() / channel.units_per_code()).round() as i16
+            };
+            let codes: Vec<i16> = (0..scans)
+                .flat_map(|scan| [velocity(0, 2e-7, 0.0, scan), velocity(1, 1e-7, TAU / 6.0, scan), 0])
+                .collect();
+            let got = meter.amplitude(&codes, 3);
+            assert!((got / (3f64.sqrt() * 1e-7) - 1.0).abs() < 1e-3, "{frequency_hz} Hz: {got}");
+            assert_eq!(Meter::new(&map, Held::Force, frequency_hz).amplitude(&codes, 3), 0.0);
+        }
+    }
+
+    #[test]
+    fn settled_is_steady_and_where_it_was_ordered() {
+        let windows = |values: [f64; 6]| [&[0.2, 0.9, 1.3][..], &values[..]].concat();
+        assert!(is_settled(&windows([1.01, 0.995, 1.0, 1.002, 0.99, 1.01]), Some(1.0)));
+        assert!(
+            !is_settled(&windows([0.981, 0.984, 0.988, 0.992, 0.998, 1.003]), Some(1.0)),
+            "still drifting"
+        );
+        assert!(!is_settled(&windows([1.0, 1.0, 1.0, 1.0, 1.0, 1.03]), Some(1.0)));
+        assert!(!is_settled(&windows([0.5; 6]), Some(1.0)) && is_settled(&windows([0.5; 6]), None));
+        assert!(!is_settled(&[1.0; 5], Some(1.0)) && !is_settled(&[0.0; 6], None));
+    }
+}
+
+#[cfg(test)]
+mod options_tests {
+    use super::*;
+    use jointrig_protocol::channel::{Channel, Quantity};
+
+    #[test]
+    fn forces_are_limited_and_a_users_limit_counts_more() {
+        let channel = |name: &str, role| Channel {
+            name: name.parse().expect("short"),
+            role,
+            quantity: Quantity::Velocity,
+            units_per_volt: -1e-3,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        };
+        let channels = ChannelMap {
+            id: 0,
+            rate_hz: 51_200,
+            exact_hz: None,
+            channels: vec![
+                channel("hammer", Role::HammerForce),
+                channel("LDV_A", Role::SpecimenA),
+                channel("LC1", Role::LoadCell),
+            ],
+        };
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8);
+        assert!(near(&Limits::default().of(&channels), &[0.0, 0.0, 9.5e-3]));
+        let own = Limits(vec![("LDV_A".into(), 2e-3), ("hammer".into(), 1.0)]);
+        assert!(near(&own.of(&channels), &[1.0, 2e-3, 9.5e-3]));
     }
 }

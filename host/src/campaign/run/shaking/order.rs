@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use jointrig_protocol::answer::{Info, Shaker};
 use jointrig_protocol::request::Shake;
 
+use super::Options;
 use super::error::{ShakeError, Shortfall};
-use super::options::Options;
 use crate::campaign::plan::level::{Held, Level};
 use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
