@@ -16,7 +16,7 @@ use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSigna
 use crate::results::MAIN_BAND;
 use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
 use crate::structure::Structure;
-use crate::substructuring::averaged::CellHits;
+use crate::substructuring::averaged;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
 use num_complex::Complex;
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ pub struct Cells {
     /// FRFs of the cells that have a kept hit.
     pub averages: Vec<CellAverage>,
     /// Spectra of single hits, if requested.
-    pub hits: Vec<CellHits>,
+    pub hits: Vec<averaged::CellHits>,
     /// The loops of the hits that move the contact.
     pub loops: Vec<ImpactLoop>,
     /// The response of each of these hits per newton, cell by cell.
@@ -145,7 +145,7 @@ pub fn of(
     cell: &Cell,
     sigma_per_s: f64,
     quantity: MotionQuantity,
-) -> Result<Option<CellHits>, SpectraError> {
+) -> Result<Option<averaged::CellHits>, SpectraError> {
     let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
     let channels: Vec<&Point> =
         points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
@@ -179,7 +179,7 @@ pub fn of(
             }
         }
     }
-    Ok(Some(CellHits {
+    Ok(Some(averaged::CellHits {
         input: name.impact.clone(),
         outputs: channels.iter().map(|c| c.description.clone()).collect(),
         auto,

@@ -12,7 +12,7 @@ use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
-use crate::substructuring::{Frf, Geometry, IdmSet};
+use crate::substructuring::{Geometry, IdmSet};
 use num_complex::Complex;
 
 /// The cell of this impact and channel, if it was measured.

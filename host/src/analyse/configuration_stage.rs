@@ -7,7 +7,7 @@ use super::findings::{ConfigurationFindings, ImportedFrom};
 use super::missing::Missing;
 use super::{assemble, chosen, imported};
 use crate::results::UsableBand;
-use crate::spectra::estimate;
+use crate::spectra::usable_band;
 use crate::structure::Structure;
 use crate::substructuring::Frf;
 use crate::substructuring::geometry::Configuration;

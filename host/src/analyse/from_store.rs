@@ -27,7 +27,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
-use crate::results::{Calibrated, CellRow, Cells, Completeness, HitRow, Source, rounded};
+use crate::results::{self, Calibrated, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;
@@ -578,7 +578,7 @@ impl CampaignFile {
             let count = self.tally.cell(cell.id);
             let name = &cell.name;
             let own = heard.cells.iter().find(|h| h.name == *name);
-            CellRow {
+            results::CellRow {
                 configuration: name.configuration.into(),
                 impact: name.impact.clone(),
                 response: name.response.clone(),

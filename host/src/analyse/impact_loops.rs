@@ -87,7 +87,7 @@ fn in_step(contact: &ContactSignals, delays: ContactDelays, fs_hz: f64) -> [Vec<
     let ContactSignals { specimen_a_m_per_s, specimen_b_m_per_s, tangential_n, .. } = contact;
     let delays = [delays.specimen_a, delays.specimen_b, delays.load_cells];
     let signals = [specimen_a_m_per_s, specimen_b_m_per_s, tangential_n];
-    delays::in_step(signals.map(Vec::clone), delays, fs_hz)
+    record::in_step(signals.map(Vec::clone), delays, fs_hz)
 }
 
 /// All first cycles combined; `None` without any.

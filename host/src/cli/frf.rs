@@ -18,7 +18,7 @@ use crate::exchange::{Extra, StatedUnits, write_frf};
 use crate::outside::tell_line;
 use crate::spectra::{
     CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Pulse, PulseSamples,
-    Windowing, estimate, reversed_peak_n, several_hits_s,
+    Windowing, estimate, reversed_peak_n, several_hits_s, usable_band,
 };
 use crate::substructuring::Band;
 

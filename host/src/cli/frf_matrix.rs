@@ -20,7 +20,7 @@ use crate::exchange::{StatedUnits, write_frf};
 use crate::frf::Frf;
 use crate::frf::common_lines::same;
 use crate::outside::tell_line;
-use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate};
+use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate, usable_band};
 
 /// Options for converting records to FRFs.
 pub(super) struct Wishes<'w> {

@@ -13,8 +13,6 @@ use crate::campaign::watch::Watchers;
 use crate::dashboard::{Dashboard, Measuring};
 use crate::device::tap::Tap;
 use crate::outside::tell_line;
-#[cfg(feature = "dashboard")]
-use crate::outside::tell_line;
 use clap::Args;
 use std::fs::{File, OpenOptions};
 use std::io;

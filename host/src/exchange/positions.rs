@@ -7,7 +7,6 @@
 //! Reads a geometry in any of its file formats.
 
 use super::tables::{Cell, Tables, csv_tables, workbook_tables};
-use crate::substructuring::Geometry;
 use crate::substructuring::geometry::{Configuration, FARTHEST_M, Geometry, Grouping, Point};
 use crate::{advice, foreign};
 use std::collections::BTreeMap;

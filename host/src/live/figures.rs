@@ -13,7 +13,7 @@ use crate::report;
 use crate::report::cell_records::{Shown, close};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
 use crate::results::Results;
-use crate::spectra::{CrossSpectra, estimate};
+use crate::spectra::{CrossSpectra, usable_band};
 use jointrig_protocol::channel::{Channel, Quantity};
 
 /// Points of an envelope: two per pixel of a wide screen.

@@ -28,6 +28,8 @@ mod document;
 pub mod figure;
 mod figures;
 mod page;
+#[cfg(feature = "png")]
+mod png;
 mod scale;
 mod svg;
 mod tables;
@@ -146,7 +148,7 @@ pub fn write_figure(figure: &figure::Figure, format: Format, path: &Path) -> io:
     let content = match format {
         Format::Svg => svg::file(figure).into_bytes(),
         #[cfg(feature = "png")]
-        Format::Png => scale::png(&svg::file(figure)).map_err(io::Error::other)?,
+        Format::Png => png::png(&svg::file(figure)).map_err(io::Error::other)?,
         Format::Csv => csv::csv(figure).into_bytes(),
     };
     write_whole(path, &content)

@@ -38,7 +38,7 @@ use crate::hysteresis::impact::DecayCycle;
 use crate::hysteresis::{LoopFinding, ShapeEvidence};
 use crate::identified::SCATTER_OF_LINES;
 use crate::substructuring::averaged::{DofEstimate, Replicates};
-use crate::substructuring::{Band, BandStatistic as Statistics, Dof};
+use crate::substructuring::{Band, Dof};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

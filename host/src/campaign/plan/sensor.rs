@@ -13,7 +13,7 @@
 
 use super::faults::{Faults, first, read};
 use super::structure::{dot, unit};
-use super::{Cell, PRINTABLE, Plan, PlanError, ResponsePoint, configuration_name, printable};
+use super::{Cell, PRINTABLE, Plan, PlanError, configuration_name, printable};
 use crate::device::channels::ChannelMap;
 use crate::substructuring::geometry::{FARTHEST_M, too_far};
 use jointrig_protocol::channel::Role;

@@ -29,7 +29,7 @@ pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
                     bar(drawing, place, bars, i, at, *aside, stroke);
                 }
                 if let Some(at) = inside(place, at) {
-                    marker(drawing, [at[0] + aside, at[1]], role, *marker);
+                    draw_marker(drawing, [at[0] + aside, at[1]], role, *marker);
                 }
             }
         }
@@ -206,7 +206,7 @@ fn strips(drawing: &mut Drawing, place: &Place, fill: &str, x: &Packed, values: 
 pub const RADIUS: f64 = 4.0;
 
 /// Draws the marker of a point.
-pub fn marker(drawing: &mut Drawing, at: [f64; 2], role: Role, marker: Marker) {
+pub fn draw_marker(drawing: &mut Drawing, at: [f64; 2], role: Role, marker: Marker) {
     let name = role.name();
     let stroke = format!("s-{name}");
     match marker {

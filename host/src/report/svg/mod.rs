@@ -103,7 +103,7 @@ pub fn sample(drawing: &mut Drawing, role: Role, drawn: Drawn, [x, y]: [f64; 2])
             let stroke = Stroke { class: &class, width: role.width().max(1.6), dash: role.dash() };
             drawing.line([x, y], [x + 22.0, y], stroke);
         }
-        Drawn::Points(marker) => marks::marker(drawing, [x + 11.0, y], role, marker),
+        Drawn::Points(marker) => marks::draw_marker(drawing, [x + 11.0, y], role, marker),
         Drawn::Area => {
             let area = drawing::Area { left: x, top: y - 5.0, width: 22.0, height: 10.0 };
             drawing.fill(area, &format!("f-{}", role.name()), 0.3);

@@ -60,7 +60,7 @@ pub fn draw(drawing: &mut Drawing, area: Area, scene: &Scene) {
             drawing.line(at(from), place, Stroke::new(&class, 2.0));
         }
         let marker = if spot.toward.is_some() { Marker::Dot } else { Marker::Frame };
-        marks::marker(drawing, place, spot.role, marker);
+        marks::draw_marker(drawing, place, spot.role, marker);
         let width = 6.8 * spot.name.chars().count() as f64;
         let places =
             [[7.0, -5.0], [7.0, 14.0], [-7.0 - width, -5.0], [-7.0 - width, 14.0], [7.0, -17.0], [7.0, 26.0]];

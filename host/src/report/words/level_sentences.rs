@@ -7,7 +7,6 @@ use super::number::{decimals, prefixed, short, stiffness};
 use super::warning_sentences::loop_finding;
 use crate::analyse::NoLevelStiffness;
 use crate::contact::Shares;
-use crate::hysteresis::Shape;
 use crate::results::{BESIDE_THE_CONTACT, Excitation, Force, Hysteresis, Results, Shape};
 
 /// Contributions to a level's interval; `correction` is the part of T/Δx at the measured points
