@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use jointrig::campaign::verdict::{Kind, Limits, judge_all};
 use jointrig::exchange::read_impacts;
-use jointrig::spectra::{FrfSettings, estimate};
+use jointrig::spectra::{FrfSettings, estimate, usable_band};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let given = std::env::args_os().nth(1).map(PathBuf::from);

@@ -1,7 +1,7 @@
 //! No wake-up is lost, in any interleaving of the device's thread and the host's. Every
 //! interleaving is tried:
 //!
-//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test wakes
+//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test it wakes
 //!     --target-dir target/loom
 //!
 //! Without that flag this file is empty.

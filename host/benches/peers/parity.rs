@@ -14,7 +14,7 @@ use jointrig::exchange::uff::{
     Precision, TraceLine, Units, Values, read, write,
 };
 use jointrig::exchange::{Extra, read_impacts, write_frf, write_impacts};
-use jointrig::spectra::{CrossSpectra, ImpactRecords, Pulse, SpectraAverage, Windowing};
+use jointrig::spectra::{CrossSpectra, ImpactRecords, Pulse, PulseSamples, SpectraAverage, Windowing};
 use num_complex::Complex;
 use serde_json::Value;
 use std::path::Path;
@@ -73,9 +73,10 @@ fn records(folder: &Path) -> Outcome {
     let mut windowed = ImpactRecords { force_n: Vec::new(), response: Vec::new(), ..records.clone() };
     let mut average = SpectraAverage::new(records.fs_hz, samples, 1);
     for (force, responses) in records.force_n.iter().zip(&records.response) {
-        let origin_s = Pulse::locate(force).ok_or("no pulse")?.start as f64 / records.fs_hz;
+        let pulse = Pulse::locate(force).ok_or("no pulse")?;
+        let origin_s = pulse.start as f64 / records.fs_hz;
         let (mut f, mut x) = (vec![0.0; samples], vec![0.0; samples]);
-        window.force_into(force, &decay, origin_s, &mut f);
+        window.force_into(force, &decay, origin_s, &PulseSamples::of(&pulse, force), &mut f);
         window.of_response(&decay, origin_s).response_into(&responses[0], 0, &mut x);
         for x in &mut x {
             *x *= 1e4;

@@ -8,8 +8,8 @@
 use super::{Outcome, script};
 use jointrig::exchange::npz::NpzFile;
 use jointrig::exchange::{read_frf, read_positions};
-use jointrig::substructuring::consistency::consistency;
 use jointrig::substructuring::geometry::{Configuration, Geometry, Grouping};
+use jointrig::substructuring::quality::consistency;
 use jointrig::substructuring::semm::{FULLY_EXTENDED, Form, semm};
 use jointrig::substructuring::virtual_points::{VirtualPoint, Weights, transform};
 use jointrig::substructuring::vpt;

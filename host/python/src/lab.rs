@@ -47,7 +47,7 @@ impl Lab {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let (kept, wanted) = self.read(py, status::counts)?;
+        let (kept, wanted) = self.read(py, progress::counts)?;
         Ok(format!("Lab({:?}): {kept} of {wanted} good hits", self.path.display().to_string()))
     }
 
@@ -61,7 +61,7 @@ impl Lab {
 
     /// The document of `jointrig campaign status --json`.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let found = self.read(py, |store| status::document(store).map(|found| found.to_string()))?;
+        let found = self.read(py, |store| progress::document(store).map(|found| found.to_string()))?;
         values(py, &found)
     }
 

@@ -1,7 +1,7 @@
-use super::store::record_table::NewRecord;
 use super::*;
 use crate::campaign::plan::SMALL;
 use crate::campaign::store::notes::utc_now;
+use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};

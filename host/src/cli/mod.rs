@@ -173,7 +173,7 @@ pub struct AnalyseForPage {
 }
 
 impl AnalyseForPage {
-    pub fn run(self) -> Result<(), CliError> {
+    fn run(self) -> Result<(), CliError> {
         analyse_for_another(&self.file, self.last, &mut std::io::stdout().lock()).map_err(|source| {
             CliError::File { path: self.file, doing: "analysing for the live page", source }
         })
@@ -188,7 +188,7 @@ pub struct Completions {
 }
 
 impl Completions {
-    pub fn run(self) {
+    fn run(self) {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "jointrig", &mut text);
         // a closed pipe is no error: the shell has read enough
@@ -205,7 +205,7 @@ pub struct Man {
 }
 
 impl Man {
-    pub fn run(self) -> Result<(), CliError> {
+    fn run(self) -> Result<(), CliError> {
         let command = Cli::command();
         let Some(folder) = self.out else {
             let mut text = Vec::new();

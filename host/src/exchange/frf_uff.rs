@@ -523,7 +523,9 @@ mod tests {
 
     fn scale(f: &mut Function, factor: f64) {
         if let Values::Complex(values) = &mut f.values {
-            values.iter_mut().for_each(|v| *v *= factor);
+            for v in values {
+                *v *= factor;
+            }
         }
     }
 

@@ -412,7 +412,7 @@ mod tests {
     #[test]
     fn another_axis_than_the_points_is_refused_with_both_named() {
         let points = Configuration {
-            channels: vec![point("L", "L", Z), point("S", "S", [0.7071, 0.7071, 0.0])],
+            channels: vec![point("L", "L", Z), point("S", "S", [0.6, 0.8, 0.0])],
             impacts: vec![point("AZ1", "AZ1", DOWN)],
         };
         let said = |output: Label, input: Label| {

@@ -560,7 +560,9 @@ mod tests {
 
     fn times(f: &mut Function, factor: f64) {
         if let Values::Real(values) = &mut f.values {
-            values.iter_mut().for_each(|v| *v *= factor);
+            for v in values {
+                *v *= factor;
+            }
         }
     }
 

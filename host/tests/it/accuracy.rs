@@ -4,7 +4,7 @@
 //! The rig has a rigid clamp and the default errors of position, aim and angle, drawn separately
 //! for each campaign. The ignored test prints the tables of `docs/accuracy.md`:
 //!
-//!     cargo test --release -p jointrig --test accuracy -- --ignored --nocapture
+//!     cargo test --release -p jointrig --test it accuracy -- --ignored --nocapture
 #![cfg(feature = "sim")]
 
 use crate::simulated;

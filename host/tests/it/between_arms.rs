@@ -6,10 +6,9 @@
 //! every fifth rig has a clamp so far from the contact's axis that the specimen's local mode is
 //! visible between the arms. The ignored test prints the table of `docs/accuracy.md`:
 //!
-//!     cargo test --release -p jointrig --test between_arms -- --ignored --nocapture
+//!     cargo test --release -p jointrig --test it between_arms -- --ignored --nocapture
 #![cfg(feature = "sim")]
 
-#[expect(dead_code, reason = "the rest is for the other tables")]
 use crate::simulated;
 
 use jointrig::substructuring::averaged::{Priors, averaged};

@@ -2,7 +2,7 @@
 //! contact campaign, on rigs that differ in contact, clamps, masses, damping and noise, half of
 //! them stuck.
 //!
-//!     cargo test --release -p jointrig --test hammer_slip -- --ignored --nocapture
+//!     cargo test --release -p jointrig --test it hammer_slip -- --ignored --nocapture
 #![cfg(feature = "sim")]
 
 use jointrig::hysteresis::hammer_slip::{CellHits, HammerSlip, Unclear};

@@ -2,11 +2,7 @@
 //! s = σ + iω, assembled directly.
 
 use jointrig::substructuring::coupling::couple;
-use jointrig::substructuring::decoupling;
-use jointrig::substructuring::decoupling;
-use jointrig::substructuring::decoupling;
-use jointrig::substructuring::decoupling;
-use jointrig::substructuring::decoupling::{InverseBlock, PrimalBlock};
+use jointrig::substructuring::decoupling::{InverseBlock, PrimalBlock, interface, internal, inverse, primal};
 use jointrig::substructuring::geometry::{Grouping, Point};
 use jointrig::substructuring::idm::{IdmSet, rigid_row};
 use jointrig::substructuring::joint_over_bands::stiffness_and_damping;

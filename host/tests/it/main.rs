@@ -20,6 +20,7 @@ mod records;
 mod rewrites;
 mod scripted_device;
 mod shaker;
+#[cfg(feature = "sim")]
 mod simulated;
 mod spectra_reference;
 mod verdict;

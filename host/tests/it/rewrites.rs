@@ -2,7 +2,7 @@
 //! directions, listed or even abscissa values, digits, order, text or binary, padding, line ends.
 //! Every file gives the same numbers to 1e-5, or a refusal that names the cause.
 //!
-//! `JOINTRIG_REWRITES=10000 cargo test -p jointrig --test rewrites` tries more of them.
+//! `JOINTRIG_REWRITES=10000 cargo test -p jointrig --test it rewrites` tries more of them.
 
 use jointrig::exchange::record_file::PlannedPlace;
 use jointrig::exchange::uff::{
@@ -183,7 +183,7 @@ impl Form {
         let mut out = String::from_utf8(bytes[..text].to_vec()).expect("text");
         if !binary {
             let last = out.rfind("    -1").expect("an end");
-            let zeros = (0..self.zeros).map(|_| format!("{:>13}", "0.00000e+00")).collect::<String>();
+            let zeros = format!("{:>13}", "0.00000e+00").repeat(self.zeros);
             let values = out[..last].trim_end_matches('\n').to_owned();
             out = format!("{values}{}{zeros}\n    -1\n", if zeros.is_empty() { "" } else { "\n" });
         }
@@ -253,13 +253,12 @@ fn units(told: Told, motion: Unit, force: Unit, time_power: i32, per_force: bool
     };
     match told {
         Told::Nowhere => plain(silent.clone(), silent),
-        Told::Labels => plain(own(motion), own(force)),
         Told::Ratio { own: with_own } if per_force => {
             let bare = motion.0.trim_matches(['[', ']']);
             let label = format!("({bare})/{}", force.0);
             plain((label, motion.1), (if with_own { force.0.to_owned() } else { String::new() }, force.1))
         }
-        Told::Ratio { .. } => plain(own(motion), own(force)),
+        Told::Labels | Told::Ratio { .. } => plain(own(motion), own(force)),
         Told::System(system) => {
             let (length, force) = of_system(system);
             ToldUnits { system: Some(system), ..plain((String::new(), length), (String::new(), force)) }

@@ -2,7 +2,7 @@
 //! implementation with the same windows.
 
 use jointrig::exchange::read_impacts;
-use jointrig::spectra::{ForceWeighting, FrfSettings, Origin, Windowing, estimate};
+use jointrig::spectra::{ForceWeighting, FrfSettings, Origin, Windowing, estimate, usable_band};
 use num_complex::Complex;
 use serde_json::Value;
 use std::path::Path;

@@ -289,7 +289,7 @@ fn after_a_failure_or_a_power_cut_the_campaign_goes_on_to_the_same_records() {
     power_cuts(&setting, setting.deeds.len() / 40, 1);
 }
 
-/// Takes some minutes: `cargo test --release -p jointrig-tests --test faults -- --ignored`.
+/// Takes some minutes: `cargo test --release -p jointrig-tests --test it faults -- --ignored`.
 #[test]
 #[ignore = "every single one"]
 fn every_single_one() {

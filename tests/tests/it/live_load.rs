@@ -3,7 +3,7 @@
 //!
 //!     cargo build --release -p jointrig
 //!     JOINTRIG_BIN=target/release/jointrig cargo test --release -p jointrig-tests \
-//!     --test live_load -- --ignored --nocapture
+//!     --test it live_load -- --ignored --nocapture
 //!
 //! `JOINTRIG_SOAK_H` is the duration of the soak test in hours of the simulated rig [default: 0.5].
 #![cfg(target_os = "linux")]

@@ -2,7 +2,7 @@
 
 use embassy_usb_driver::{EndpointAddress, Event};
 
-use crate::usb::bus::Bus;
+use super::bus::Bus;
 
 /// The device responded with a stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,7 @@
 //! Exact FRFs of an independent implementation, stored in `tests/data`.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps what is not there should fail")]
+
 use std::path::Path;
 
 use nalgebra::DMatrix;

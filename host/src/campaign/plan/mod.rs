@@ -378,7 +378,7 @@ impl Plan {
         Some(own.patience_s.unwrap_or(PATIENCE_S))
     }
 
-    pub(super) fn check_hammer(&self, faults: &mut Faults) {
+    fn check_hammer(&self, faults: &mut Faults) {
         let Some(own) = &self.hammer else { return };
         let at = own.span().start;
         faults.unless(

@@ -1,8 +1,8 @@
-use super::record_table::NewRecord;
 use super::*;
 use crate::campaign::plan::{Plan, SMALL};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
+use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Kind, Verdict};

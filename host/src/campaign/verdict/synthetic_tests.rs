@@ -209,6 +209,7 @@ fn hann_hit(fs_hz: f64, n: usize, start_s: f64, width_s: f64, f0_hz: f64) -> [Ve
     let pole = C::new(-zeta * w, w * (1.0f64 - zeta * zeta).sqrt());
     let terms = [(12.5, 0.0), (-6.25, TAU / width_s), (-6.25, -TAU / width_s)];
     let mut all = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+    #[allow(clippy::needless_range_loop, reason = "three signals are written at one place")]
     for i in 0..n {
         let t = i as f64 / fs_hz - start_s;
         if t <= 0.0 {
@@ -329,7 +330,7 @@ fn a_soft_pulse_is_one_hit_at_any_rate() {
             let [force, v, _] = hann_hit(fs_hz, n, 0.1, width_s, 20.0);
             for noise in [0.0, 1e-3] {
                 let force: Vec<f64> = force.iter().map(|f| f + 25.0 * noise * dice.gauss()).collect();
-                let found = judged(fs_hz, &force, &[v.clone()]);
+                let found = judged(fs_hz, &force, std::slice::from_ref(&v));
                 assert_eq!(found.kind, Kind::Good, "{fs_hz} Hz, {width_s} s: {found:?}");
             }
         }

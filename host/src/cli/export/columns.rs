@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::analysed;
 use super::records::Written as Place;
 use super::{What, bad, estimates, levels, make_folder, tables};
 use crate::analyse;
@@ -16,7 +17,6 @@ use crate::campaign::store::Store;
 use crate::campaign::store::record_table::RecordRow;
 use crate::cli::analyse::write_into;
 use crate::cli::error::CliError;
-use crate::cli::export;
 use crate::cli::output;
 use crate::cli::output::Waiting;
 use crate::device::channels::ChannelMap;

@@ -40,6 +40,7 @@ const ROLES: [Role; 5] = [
 ];
 
 /// The device; its fields are the script.
+#[allow(clippy::struct_excessive_bools, reason = "each is one thing that a device may do wrong")]
 pub struct Fake {
     /// Blocks that begin here are dropped in the device and reported.
     pub drops: Range<u64>,
