@@ -14,7 +14,7 @@ struct Source {
     /// The table's name, in the page and in the test's output.
     table: &'static str,
     package: &'static str,
-    target: &'static str,
+    module: &'static str,
     test: &'static str,
     /// The part of it that the page shows.
     part: Option<(&'static str, &'static str)>,
@@ -23,10 +23,10 @@ struct Source {
 const fn source(
     table: &'static str,
     package: &'static str,
-    target: &'static str,
+    module: &'static str,
     test: &'static str,
 ) -> Source {
-    Source { table, package, target, test, part: None }
+    Source { table, package, module, test, part: None }
 }
 
 const SOURCES: [Source; 9] = [
@@ -83,8 +83,9 @@ pub fn run(project: &Project, tables: &[String]) -> Result<()> {
 /// Runs a test, prints its output, and returns its table and whether it passed.
 fn printed(project: &Project, source: &Source) -> Result<(String, bool)> {
     let mut cargo = command::cargo(&project.root);
-    cargo.args(["test", "--release", "--package", source.package, "--test", source.target, "--"]);
-    cargo.args(["--ignored", "--exact", source.test, "--nocapture"]);
+    cargo.args(["test", "--release", "--package", source.package, "--test", "it", "--"]);
+    let test = format!("{}::{}", source.module, source.test);
+    cargo.args(["--ignored", "--exact", &test, "--nocapture"]);
     cargo.envs(source.part).stdout(Stdio::piped());
     println!("  $ {}", command::line(&cargo));
     let mut test = cargo.spawn().context("cargo cannot be started")?;

@@ -11,7 +11,6 @@ mod frf;
 mod hammer;
 mod impact_record;
 mod own_structure;
-mod qemu;
 mod records;
 mod reference;
 mod rigs_page;

@@ -6,7 +6,8 @@
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
-use crate::support;
+#[path = "it/support/mod.rs"]
+mod support;
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
