@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use jointrig::campaign::verdict::{Kind, Limits, judge_all};
+use jointrig::campaign::verdict::{Limits, Verdict, judge_all};
 use jointrig::exchange::read_impacts;
 use jointrig::spectra::{FrfSettings, estimate, usable_band};
 
@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         given.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/impacts/good.npz").into());
     let records = read_impacts(&path)?;
     let verdicts = judge_all(&records, &Limits::default(), None);
-    let good: Vec<bool> = verdicts.iter().map(|verdict| verdict.kind == Kind::Good).collect();
+    let good: Vec<bool> = verdicts.iter().map(|verdict| verdict.kind == Verdict::Good).collect();
     let y = estimate(&records, &good, &FrfSettings::default())?;
     let band = usable_band(y.frequency_hz(), &y.force_spectrum(), 6.0);
     println!("{} of {} hits are good", good.iter().filter(|good| **good).count(), good.len());

@@ -1,7 +1,7 @@
 //! Analyses of arrays: FRFs of impact records, and loops.
 
 use jointrig::analyse::{Findings, RecordLoops};
-use jointrig::campaign::verdict::{Kind, Limits, judge_all};
+use jointrig::campaign::verdict::{Limits, Verdict, judge_all};
 use jointrig::hysteresis::{HysteresisError, HysteresisRecord, RelativeMotion, analyse};
 use jointrig::report::document;
 use jointrig::results::Source;
@@ -76,7 +76,7 @@ pub fn frf<'py>(
     let input = input.to_owned();
     let found = interruptible::run(py, move |_| {
         let verdicts = judge_all(&records, &Limits::default(), None);
-        let used: Vec<bool> = verdicts.iter().map(|verdict| verdict.kind == Kind::Good).collect();
+        let used: Vec<bool> = verdicts.iter().map(|verdict| verdict.kind == Verdict::Good).collect();
         if !used.contains(&true) {
             let why: Vec<String> = verdicts.iter().map(|verdict| verdict.sentence.clone()).collect();
             return Err(format!("no hit is good, so there is nothing to average: {}", why.join("; ")));
@@ -91,7 +91,7 @@ pub fn frf<'py>(
         Ok((whole.map_err(|error| error.to_string())?, verdicts))
     })?;
     let (frf, verdicts) = found.map_err(|what: String| raised::refused(py, &what))?;
-    let used = verdicts.iter().filter(|verdict| **verdict == Kind::Good.name()).count();
+    let used = verdicts.iter().filter(|verdict| **verdict == Verdict::Good.name()).count();
     let hits = nalgebra::DMatrix::from_element(frf.outputs().len(), 1, used);
     Ok((Frf::with_hits(frf, hits), verdicts))
 }

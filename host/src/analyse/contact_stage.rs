@@ -21,7 +21,7 @@ use crate::contact::{BAND, ContactCell, ContactError, Input, Joint, Known, Stiff
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
-use crate::hysteresis::static_arm::{Basis, Identified, from_known_force, from_levels};
+use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_known_force, from_levels};
 use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, Role, ShakerLoop, rounded};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
@@ -208,7 +208,7 @@ fn known_arm<M: Measurements>(
     let known = measurements.known_contact();
     if let Some(effective_mass_kg) = known.effective_mass_kg {
         let correction = Correction { effective_mass_kg, parallel_path: known.parallel_path.unwrap_or(0.0) };
-        return Some(Identified { correction, basis: Basis::Given, residual: 0.0 });
+        return Some(Identified { correction, basis: CorrectionSource::Given, residual: 0.0 });
     }
     let geometry = measurements.geometry();
     let (points, at, sigma_per_s) = (&geometry.b, geometry.virtual_point_b_m, measurements.sigma_per_s());

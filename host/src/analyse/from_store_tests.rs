@@ -7,7 +7,7 @@ use crate::campaign::store::notes::utc_now;
 use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::device::stream::Recording;
 use crate::substructuring::Frf;
 use clap::Parser;
@@ -128,10 +128,10 @@ fn campaign(path: &Path, late_ns: &[u32]) -> Store {
         store.cells().expect("cells").iter().filter(|c| structure(c.cell.configuration) == Structure::Ajb)
     {
         for (attempt, (peak, kind)) in
-            [(50.0, Kind::Good), (48.0, Kind::DoubleHit), (46.0, Kind::Good)].into_iter().enumerate()
+            [(50.0, Verdict::Good), (48.0, Verdict::DoubleHit), (46.0, Verdict::Good)].into_iter().enumerate()
         {
             let verdict =
-                Verdict { peak_n: peak, ..Verdict::without_pulse(kind, 0.0, 0.0, "made up".into()) };
+                Judgement { peak_n: peak, ..Judgement::without_pulse(kind, 0.0, 0.0, "made up".into()) };
             let (session, map) = &sessions[(attempt / 2) % sessions.len()];
             let record = NewRecord {
                 cell: cell.id,

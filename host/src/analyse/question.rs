@@ -139,7 +139,7 @@ impl Question {
 
     /// The fit with each set of modes over each band.
     fn fits(&self, frfs: [Frf; 3], geometry: &Geometry, idms: &[IdmSet], bands: &[Band]) -> Vec<Fit> {
-        let shape = if self.full_joint { fit::Shape::Full } else { fit::Shape::Diagonal };
+        let shape = if self.full_joint { fit::FreeEntries::Full } else { fit::FreeEntries::Diagonal };
         let options =
             fit::Options { priors: self.priors, shape, mounting: self.mounting, ..fit::Options::default() };
         let mut known = Vec::new();

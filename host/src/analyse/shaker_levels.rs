@@ -48,7 +48,7 @@ pub struct RecordLoops {
     /// With the force corrected for the static arm.
     pub corrected: Option<LoopAnalysis>,
     /// For a level of a campaign: the contact's k_T at it, or why there is none.
-    pub own: Option<Outcome>,
+    pub own: Option<LevelOutcome>,
 }
 
 /// Every steady level, analysed with the raw force, and with the corrected one if the static `arm`
@@ -96,7 +96,11 @@ pub fn swept(levels: &[ShakerLevel]) -> Vec<ContactCompliance> {
 
 /// The loops of every level: raw, and corrected if the static arm is known and the correction gives
 /// a loop; `own` is the k_T of each at the contact.
-pub fn loops(levels: Vec<Analysed<'_>>, arm: Option<&Identified>, own: Vec<Outcome>) -> Vec<RecordLoops> {
+pub fn loops(
+    levels: Vec<Analysed<'_>>,
+    arm: Option<&Identified>,
+    own: Vec<LevelOutcome>,
+) -> Vec<RecordLoops> {
     let late =
         |level: &ShakerLevel| arm.and_then(|arm| analyse_corrected(&level.record, &arm.correction).ok());
     levels
@@ -200,7 +204,7 @@ const WIDEST: f64 = 0.1;
 const APART: f64 = 4.0;
 
 /// A level's k_T, or the reason why it has none.
-pub type Outcome = Result<LevelStiffness, NoLevelStiffness>;
+pub type LevelOutcome = Result<LevelStiffness, NoLevelStiffness>;
 
 /// Why a level has no k_T.
 #[derive(Debug, Clone, PartialEq)]
@@ -231,7 +235,7 @@ pub fn of<M: Measurements>(
     own: Result<&(Stiffness, Known), &ContactError>,
     slips: bool,
     levels: &[(&ShakerLevel, &LoopAnalysis)],
-) -> Vec<Outcome> {
+) -> Vec<LevelOutcome> {
     let all = |why: NoLevelStiffness| levels.iter().map(|_| Err(why.clone())).collect();
     if slips {
         return all(NoLevelStiffness::SlipsUnderTheHammer);
@@ -261,7 +265,7 @@ pub fn of<M: Measurements>(
 
 /// k_T of the hits combined with that of the levels that have one; `None` if there is none, or if
 /// they add nothing.
-pub fn together(own: Result<&(Stiffness, Known), &ContactError>, levels: &[Outcome]) -> Option<Joint> {
+pub fn together(own: Result<&(Stiffness, Known), &ContactError>, levels: &[LevelOutcome]) -> Option<Joint> {
     let (hits, known) = own.ok()?;
     let levels: Vec<&LevelStiffness> = levels.iter().flatten().collect();
     if levels.is_empty() { None } else { joint(hits, known, &levels) }

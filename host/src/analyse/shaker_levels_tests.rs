@@ -5,7 +5,7 @@ use super::checks::ContactChange;
 use super::shaker_levels::NoLevelStiffness;
 use super::shaker_levels::{analysed, curves, loops};
 use crate::campaign::plan::level::{Held, Level, Moment};
-use crate::hysteresis::static_arm::{Basis, Identified};
+use crate::hysteresis::static_arm::{CorrectionSource, Identified};
 use crate::hysteresis::{Correction, HysteresisRecord, RelativeMotion};
 use std::f64::consts::TAU;
 
@@ -53,7 +53,7 @@ fn raw_and_corrected_stand_side_by_side() {
     assert!(missing.is_empty());
     assert_eq!(curves(&found).len(), 1);
     let correction = Correction { effective_mass_kg: 1.5, parallel_path: 0.01 };
-    let arm = Identified { correction, basis: Basis::Given, residual: 0.0 };
+    let arm = Identified { correction, basis: CorrectionSource::Given, residual: 0.0 };
     let [one] = &loops(found, Some(&arm), vec![Err(NoLevelStiffness::NoContact)])[..] else {
         panic!("one level")
     };

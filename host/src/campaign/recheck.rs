@@ -22,7 +22,7 @@ use super::store::record_table::{RecordRow, Samples};
 use super::store::session_table::SessionInfo;
 use super::verdict::judge::{ByRecord, Judge};
 use super::verdict::others::Others;
-use super::verdict::{Kind, Verdict};
+use super::verdict::{Judgement, Verdict};
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
 
@@ -92,9 +92,9 @@ fn alike(one: f64, other: f64) -> bool {
 }
 
 /// Whether the stored verdict of a record matches the recomputed one.
-fn agrees(record: &RecordRow, found: &Verdict) -> bool {
+fn agrees(record: &RecordRow, found: &Judgement) -> bool {
     let peak = alike(record.peak_n, found.peak_n);
-    if record.verdict == Kind::Noisy && record.sentence.starts_with(TOO_EARLY) {
+    if record.verdict == Verdict::Noisy && record.sentence.starts_with(TOO_EARLY) {
         return peak;
     }
     peak && record.verdict == found.kind
@@ -166,7 +166,7 @@ impl<'s> Past<'s> {
         let of_record =
             self.overrules.iter().zip(1i64..).filter(|(overrule, _)| overrule.record == record.id);
         let last = of_record.filter(|(_, id)| self.at("overrules", *id) < then).last();
-        last.map_or(record.verdict == Kind::Good, |(overrule, _)| overrule.verdict == Kind::Good.name())
+        last.map_or(record.verdict == Verdict::Good, |(overrule, _)| overrule.verdict == Verdict::Good.name())
     }
 
     /// A sentence if none of the verdicts that were possible at the time matches the stored one.
@@ -193,8 +193,11 @@ impl<'s> Past<'s> {
                 for as_it_stood in [true, false] {
                     let mut others = Others::of(Vec::new());
                     for (other, samples) in before {
-                        let good =
-                            if as_it_stood { self.stood(other, then) } else { other.verdict == Kind::Good };
+                        let good = if as_it_stood {
+                            self.stood(other, then)
+                        } else {
+                            other.verdict == Verdict::Good
+                        };
                         if good && other.channels == map.len() && self.one_import(other, record) {
                             others.learn(plan, &map, samples.view());
                         }

@@ -81,7 +81,7 @@ enum Felt<'a> {
 }
 
 /// A kept record in SI units, and its hit direction.
-struct Hit {
+struct CheckedHit {
     record: i64,
     direction: [f64; 3],
     map: ChannelMap,
@@ -223,7 +223,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 }
 
 /// A record in SI units; `None` if it is damaged or has no pulse.
-fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, StoreError> {
+fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<CheckedHit>, StoreError> {
     let Some(cell) = store.cells()?.into_iter().find(|cell| cell.id == row.cell) else { return Ok(None) };
     let samples = match store.samples(row) {
         Ok(samples) => samples,
@@ -238,11 +238,17 @@ fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<Hit>, Store
         (0..map.len()).map(|place| map.to_si(place, samples.channel(place))).collect();
     let pulse = map.place(Role::HammerForce).and_then(|place| Pulse::locate(&signals[place]));
     let found = pulse.zip(impact(plan, &cell.cell.impact));
-    Ok(found.map(|(pulse, impact)| Hit { record: row.id, direction: impact.direction, map, signals, pulse }))
+    Ok(found.map(|(pulse, impact)| CheckedHit {
+        record: row.id,
+        direction: impact.direction,
+        map,
+        signals,
+        pulse,
+    }))
 }
 
 /// Force times velocity along the hit, summed over the pulse and normalised to −1 … 1.
-fn power_sign(hit: &Hit, place: usize, felt: [f64; 3]) -> Option<f64> {
+fn power_sign(hit: &CheckedHit, place: usize, felt: [f64; 3]) -> Option<f64> {
     let rate = hit.map.fs_hz();
     let channel = hit.map.channels.get(place)?;
     let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
@@ -283,7 +289,7 @@ fn differences(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// The mean over the rms of a channel in the first millisecond, positive along the hit (for the
 /// force itself: positive for a push).
-fn early_sign(hit: &Hit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
+fn early_sign(hit: &CheckedHit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
     let rate = hit.map.fs_hz();
     let channel = &hit.map.channels[place];
     let late = (f64::from(channel.delay_ns) * 1e-9 * rate) as usize;
@@ -298,7 +304,7 @@ fn early_sign(hit: &Hit, place: usize, felt: Option<[f64; 3]>) -> Option<f64> {
 }
 
 /// ∫F dt / (m Δv) along the hit.
-fn momentum_ratio(hit: &Hit, mass_kg: f64) -> Option<f64> {
+fn momentum_ratio(hit: &CheckedHit, mass_kg: f64) -> Option<f64> {
     let rate = hit.map.fs_hz();
     let samples = |seconds: f64| (seconds * rate) as usize;
     let force = &hit.signals[hit.map.place(Role::HammerForce)?];

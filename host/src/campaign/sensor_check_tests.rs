@@ -4,7 +4,7 @@ use crate::campaign::store::notes::utc_now;
 use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::shot::{Phase, Shot};
@@ -86,7 +86,7 @@ fn campaign(folder: &tempfile::TempDir, map: &ChannelMap) -> Store {
     let session = store.begin_session(&info, map).expect("session");
     for (attempt, peak) in [45.0, 50.0, 55.0].into_iter().enumerate() {
         let verdict =
-            Verdict { peak_n: peak, ..Verdict::without_pulse(Kind::Good, 0.0, 0.0, "made up".into()) };
+            Judgement { peak_n: peak, ..Judgement::without_pulse(Verdict::Good, 0.0, 0.0, "made up".into()) };
         let record = NewRecord {
             cell: 1,
             attempt: attempt as u32,

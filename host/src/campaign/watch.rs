@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::plan::level::Level;
 use super::store::cell_table::CellRow;
-use super::verdict::Verdict;
+use super::verdict::Judgement;
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Accounts;
 
@@ -91,7 +91,7 @@ pub enum Seen<'a> {
         /// The cell.
         row: &'a CellRow,
         /// The verdict.
-        verdict: &'a Verdict,
+        verdict: &'a Judgement,
         /// Good hits in total.
         kept: u64,
         /// Good hits still wanted.

@@ -9,7 +9,7 @@ use super::error::CliError;
 use super::frf_matrix::{Wishes, average};
 use super::hit_agreement::Agreement;
 use super::output;
-use crate::campaign::verdict::{Kind, Limits, Verdict, judge_all};
+use crate::campaign::verdict::{Judgement, Limits, Verdict, judge_all};
 use crate::exchange::frf_npz::direction_extras;
 use crate::exchange::npz::Array;
 use crate::exchange::record_file::RecordFile;
@@ -31,7 +31,7 @@ use crate::substructuring::Band;
 ///
 /// A folder of universal files becomes one matrix (--out): their labels name impacts and sensors.
 #[derive(Debug, Args)]
-pub struct Frf {
+pub struct FrfArgs {
     /// The records, or a folder of universal files.
     #[arg(value_name = "RECORDS|DIR")]
     records: PathBuf,
@@ -122,7 +122,7 @@ pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-impl Frf {
+impl FrfArgs {
     pub fn run(self) -> Result<(), CliError> {
         self.check()?;
         if self.records.is_dir() {
@@ -135,7 +135,7 @@ impl Frf {
         }
         let names = self.names(records.response.first().map_or(0, Vec::len))?;
         let verdicts = judge_all(&records, &Limits::default(), None);
-        let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Kind::Good).collect();
+        let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Verdict::Good).collect();
         if !used.contains(&true) {
             if self.json {
                 output::json(&self.document(&records, &verdicts, &self.settings(&delay_s), None))?;
@@ -182,7 +182,7 @@ impl Frf {
     }
 
     /// Explains why there is nothing to average, with advice.
-    fn nothing_good(&self, records: &ImpactRecords, verdicts: &[Verdict]) -> String {
+    fn nothing_good(&self, records: &ImpactRecords, verdicts: &[Judgement]) -> String {
         let file = self.records.display();
         let reversed: Vec<Option<f64>> = records.force_n.iter().map(|force| reversed_peak_n(force)).collect();
         if let (Some(Some(peak_n)), true) = (reversed.first(), reversed.iter().all(Option::is_some)) {
@@ -334,7 +334,7 @@ impl Frf {
     fn document(
         &self,
         records: &ImpactRecords,
-        verdicts: &[Verdict],
+        verdicts: &[Judgement],
         settings: &FrfSettings,
         found: Option<Averaged<'_>>,
     ) -> Value {
@@ -372,7 +372,7 @@ impl Frf {
         document
     }
 
-    fn words(&self, verdicts: &[Verdict], found: &CrossSpectra, excited: Option<Band>) -> Vec<String> {
+    fn words(&self, verdicts: &[Judgement], found: &CrossSpectra, excited: Option<Band>) -> Vec<String> {
         let mut lines: Vec<String> = verdicts
             .iter()
             .enumerate()

@@ -11,7 +11,7 @@ use super::hit_agreement::Agreement;
 use super::import::universal_files;
 use super::output;
 use super::output::Waiting;
-use crate::campaign::verdict::{Kind, Limits, judge_all};
+use crate::campaign::verdict::{Limits, Verdict, judge_all};
 use crate::exchange::frf_npz::direction_extras;
 use crate::exchange::labelled_frf::axis_name;
 use crate::exchange::record_file::{Directions, RecordFile};
@@ -70,7 +70,7 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
                 return Err(wrong(format!("{impact} to {response} stands in an earlier file too")));
             }
             let verdicts = judge_all(&records, &Limits::default(), None);
-            let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Kind::Good).collect();
+            let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Verdict::Good).collect();
             let good = used.iter().filter(|good| **good).count();
             if good < used.len() {
                 told.push(format!("{impact} to {response}: {good} of {} hits are good", used.len()));

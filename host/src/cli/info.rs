@@ -209,7 +209,7 @@ pub struct Devices {
 }
 
 #[derive(Debug, Serialize)]
-struct Found {
+struct FoundDevices {
     address: String,
     name: String,
     serial: Option<String>,
@@ -219,10 +219,14 @@ impl Devices {
     pub fn run(self) -> Result<(), CliError> {
         let mut found = Vec::new();
         if cfg!(feature = "sim") {
-            found.push(Found { address: "sim:".into(), name: "built-in simulated rig".into(), serial: None });
+            found.push(FoundDevices {
+                address: "sim:".into(),
+                name: "built-in simulated rig".into(),
+                serial: None,
+            });
         }
         match usb::attached() {
-            Ok(list) => found.extend(list.into_iter().map(|one| Found {
+            Ok(list) => found.extend(list.into_iter().map(|one| FoundDevices {
                 address: one.address(),
                 name: PRODUCT.into(),
                 serial: one.serial,
@@ -237,7 +241,7 @@ impl Devices {
                     }
                     _ => ("serial port".into(), None),
                 };
-                Found { address: format!("serial:{}", port.port_name), name, serial }
+                FoundDevices { address: format!("serial:{}", port.port_name), name, serial }
             })),
             Err(error) => log::warn!("serial ports cannot be listed: {error}"),
         }

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use super::error::CliError;
 use super::page::Onlooker;
 use crate::advice::quoted;
-use crate::campaign::run::progress::Progress;
+use crate::campaign::run::progress::CampaignProgress;
 use crate::campaign::run::runner::{self, Options, Summary};
 use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
@@ -53,7 +53,7 @@ pub fn measure(
     session.look_for_log_tables(Tables::new(log_tables));
     onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
     let Who { stage, yes, new_structure, stop } = who;
-    let watch = onlooker.watch.clone().and(Arc::new(Progress::default()));
+    let watch = onlooker.watch.clone().and(Arc::new(CampaignProgress::default()));
     let (edits, answers) = (onlooker.edits.take(), onlooker.answers.take());
     let options = Options { stage, yes, new_structure, watch, edits, answers, stop };
     let summary = runner::run(store, &mut session, judge, &options)?;

@@ -82,7 +82,7 @@ enum Command {
     /// Write everything that a campaign file contains in formats for other programs.
     Export(export::Export),
     /// Compute FRFs from any impact records.
-    Frf(frf::Frf),
+    Frf(frf::FrfArgs),
     /// Compute the hysteresis loops of any time record.
     Hysteresis(hysteresis::Loops),
     /// Import FRFs or impact records measured with other systems.

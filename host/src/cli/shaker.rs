@@ -13,7 +13,9 @@ use super::output::positive;
 use crate::advice;
 use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::{Held, Level, Moment};
-use crate::campaign::run::shaking::{self, CRITERION, Limits, Onlookers, Options, Outcome, Summary};
+use crate::campaign::run::shaking::{
+    self, CRITERION, ChannelLimits, LevelOptions, Onlookers, Outcome, Summary,
+};
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::LevelRow;
 use crate::device::address::Address;
@@ -110,13 +112,13 @@ impl Shaker {
         }
         output::catch(&stop);
         tell_line!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
-        let options = Options {
+        let options = LevelOptions {
             levels,
             moment,
             seconds: self.seconds,
             sweep_hz_per_s: self.rate,
             most_drive_v: self.max_drive,
-            limits: Limits(self.limits.clone()),
+            limits: ChannelLimits(self.limits.clone()),
             new_structure: self.new_structure,
             stop,
         };
@@ -186,7 +188,7 @@ impl Shaker {
         Ok(frequencies.iter().flat_map(|f| amplitudes.iter().map(move |a| level(*f, *a))).collect())
     }
 
-    fn end(&self, options: &Options, summary: &Summary) -> Result<(), CliError> {
+    fn end(&self, options: &LevelOptions, summary: &Summary) -> Result<(), CliError> {
         let count = |which: fn(&Outcome) -> bool| summary.outcomes.iter().filter(|o| which(o)).count();
         let (stored, known) =
             (count(|o| matches!(o, Outcome::Stored(_))), count(|o| matches!(o, Outcome::Known(_))));

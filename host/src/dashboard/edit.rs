@@ -20,7 +20,7 @@ use super::Shared;
 use super::routes::Problem;
 use crate::campaign::run::answers::{Answerer, Key, Question};
 use crate::campaign::run::answers::{Desk, Edit, NotTaken};
-use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::Verdict;
 use crate::live::message::Message;
 use crate::live::now::{Control, Doing};
 
@@ -57,10 +57,10 @@ pub fn routes() -> Router<Arc<Shared>> {
         .route("/api/stage", post(stage))
 }
 
-type Asked<T> = Result<Json<T>, JsonRejection>;
+type EditRequest<T> = Result<Json<T>, JsonRejection>;
 
 /// The request's content, or why it cannot be read.
-fn read<T>(asked: Asked<T>) -> Result<T, Problem> {
+fn read<T>(asked: EditRequest<T>) -> Result<T, Problem> {
     match asked {
         Ok(Json(asked)) => Ok(asked),
         Err(wrong) => Err(Problem::new(wrong.status(), wrong.body_text(), "send what docs/live.md says")),
@@ -133,38 +133,47 @@ struct Note {
     text: String,
 }
 
-async fn note(State(shared): State<Arc<Shared>>, asked: Asked<Note>) -> Result<Response, Problem> {
+async fn note(State(shared): State<Arc<Shared>>, asked: EditRequest<Note>) -> Result<Response, Problem> {
     let note = text(&read(asked)?.text)?;
     handed_in(&shared, Edit::Note(note)).await
 }
 
 #[derive(Deserialize)]
-struct Overrule {
+struct OverruleRequest {
     record: i64,
     reason: Option<String>,
 }
 
 async fn overrule(
     shared: &Shared,
-    asked: Asked<Overrule>,
-    verdict: Kind,
+    asked: EditRequest<OverruleRequest>,
+    verdict: Verdict,
     otherwise: &str,
 ) -> Result<Response, Problem> {
-    let Overrule { record, reason } = read(asked)?;
+    let OverruleRequest { record, reason } = read(asked)?;
     let reason = reason.as_deref().map_or_else(|| Ok(otherwise.to_owned()), text)?;
     handed_in(shared, Edit::Overrule { record, verdict, reason }).await
 }
 
-async fn keep(State(shared): State<Arc<Shared>>, asked: Asked<Overrule>) -> Result<Response, Problem> {
-    overrule(&shared, asked, Kind::Good, "a person kept it on the live page").await
+async fn keep(
+    State(shared): State<Arc<Shared>>,
+    asked: EditRequest<OverruleRequest>,
+) -> Result<Response, Problem> {
+    overrule(&shared, asked, Verdict::Good, "a person kept it on the live page").await
 }
 
-async fn leave_out(State(shared): State<Arc<Shared>>, asked: Asked<Overrule>) -> Result<Response, Problem> {
-    overrule(&shared, asked, Kind::Dropped, "a person dropped it on the live page").await
+async fn leave_out(
+    State(shared): State<Arc<Shared>>,
+    asked: EditRequest<OverruleRequest>,
+) -> Result<Response, Problem> {
+    overrule(&shared, asked, Verdict::Dropped, "a person dropped it on the live page").await
 }
 
-async fn undo(State(shared): State<Arc<Shared>>, asked: Asked<Overrule>) -> Result<Response, Problem> {
-    let Overrule { record, .. } = read(asked)?;
+async fn undo(
+    State(shared): State<Arc<Shared>>,
+    asked: EditRequest<OverruleRequest>,
+) -> Result<Response, Problem> {
+    let OverruleRequest { record, .. } = read(asked)?;
     handed_in(&shared, Edit::Undo { record }).await
 }
 
@@ -180,7 +189,7 @@ struct Hold {
     hold: bool,
 }
 
-async fn control(State(shared): State<Arc<Shared>>, asked: Asked<Hold>) -> Result<Response, Problem> {
+async fn control(State(shared): State<Arc<Shared>>, asked: EditRequest<Hold>) -> Result<Response, Problem> {
     let Hold { page, hold } = read(asked)?;
     let doors = shared.doors()?;
     allowed(doors)?;
@@ -222,7 +231,10 @@ struct StageAnswer {
     answer: String,
 }
 
-async fn stage(State(shared): State<Arc<Shared>>, asked: Asked<StageAnswer>) -> Result<Response, Problem> {
+async fn stage(
+    State(shared): State<Arc<Shared>>,
+    asked: EditRequest<StageAnswer>,
+) -> Result<Response, Problem> {
     let StageAnswer { page, cell, attempt, answer } = read(asked)?;
     let doors = shared.doors()?;
     let answerer = allowed(doors)?;

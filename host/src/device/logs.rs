@@ -68,7 +68,7 @@ impl Tables {
 
 /// State of decoding.
 #[derive(Default)]
-enum Reading {
+enum LogDecoder {
     /// The controller has not reported its build.
     #[default]
     BuildUnknown,
@@ -86,7 +86,7 @@ pub(super) struct DeviceLog {
     pub tables: Tables,
     /// The image with which an emulator was started.
     image: Option<PathBuf>,
-    reading: Reading,
+    reading: LogDecoder,
     waiting: Vec<u8>,
     lines: VecDeque<Line>,
     undecoded: u64,
@@ -100,9 +100,9 @@ impl DeviceLog {
 
     /// Takes the payload of a log frame.
     pub fn take(&mut self, payload: &[u8]) {
-        if let Reading::NotLooked(build) = self.reading {
+        if let LogDecoder::NotLooked(build) = self.reading {
             self.reading = match self.tables.find(build, self.image.as_deref()) {
-                Ok(table) => Reading::With(Box::new(table)),
+                Ok(table) => LogDecoder::With(Box::new(table)),
                 Err(looked) => {
                     log::warn!(
                         "{}: what the controller logs cannot be shown, for want of the table of build \
@@ -112,15 +112,15 @@ impl DeviceLog {
                         self.address,
                         file_name(build)
                     );
-                    Reading::Without
+                    LogDecoder::Without
                 }
             };
         }
         match &self.reading {
-            Reading::BuildUnknown if self.waiting.len() + payload.len() <= WAITING_BYTES => {
+            LogDecoder::BuildUnknown if self.waiting.len() + payload.len() <= WAITING_BYTES => {
                 self.waiting.extend_from_slice(payload);
             }
-            Reading::With(table) => {
+            LogDecoder::With(table) => {
                 let lost = table.lines(payload, |line| {
                     log::log!(target: "controller", line.level, "{}", line.text);
                     if self.lines.len() == LINES_KEPT {
@@ -139,8 +139,8 @@ impl DeviceLog {
 
     /// Sets the build that the controller reported, and decodes the bytes that waited for it.
     pub fn know_build(&mut self, build: u64) {
-        if matches!(self.reading, Reading::BuildUnknown) {
-            self.reading = Reading::NotLooked(build);
+        if matches!(self.reading, LogDecoder::BuildUnknown) {
+            self.reading = LogDecoder::NotLooked(build);
             let waiting = std::mem::take(&mut self.waiting);
             if !waiting.is_empty() {
                 self.take(&waiting);

@@ -73,7 +73,7 @@ pub fn contents(path: &Path) -> Result<Contents, FrfUffError> {
 }
 
 /// An FRF of a file with the information from its axes.
-struct Part<'c> {
+struct FrfPart<'c> {
     function: &'c Function,
     values: &'c [Complex<f64>],
     scale: Scale,
@@ -109,7 +109,7 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
     let (response_labels, reference_labels) = (labels(|f| &f.response), labels(|f| &f.reference));
     let (outputs, inputs) = (output_names(&response_labels), input_names(&reference_labels));
     let mut axes: Vec<(Places<'_>, usize)> = Vec::new();
-    let mut parts: Vec<Part<'_>> = Vec::new();
+    let mut parts: Vec<FrfPart<'_>> = Vec::new();
     let mut words: Vec<String> = Vec::new();
     for (at, (f, values, system)) in functions.iter().enumerate() {
         let of = |what: String| format!("the FRF from `{}` to `{}`: {what}", inputs[at], outputs[at]);
@@ -132,7 +132,7 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
         if let Some(note) = scale.note.as_ref().filter(|note| !notes.contains(note)) {
             notes.push(note.clone());
         }
-        parts.push(Part { function: f, values, scale, axis });
+        parts.push(FrfPart { function: f, values, scale, axis });
     }
     let (frequency_hz, kept) = common_axis(&axes, &mut notes).map_err(|(axis, apart)| {
         let at = parts.iter().position(|part| part.axis == axis).unwrap_or(0);
@@ -159,7 +159,7 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
     let mut found = vec![DMatrix::from_element(rows.len(), columns.len(), hole); lines];
     let mut filled = DMatrix::from_element(rows.len(), columns.len(), false);
     let mut first_labels = (vec![None; rows.len()], vec![None; columns.len()]);
-    for (at, Part { function, values, scale, axis }) in parts.iter().enumerate() {
+    for (at, FrfPart { function, values, scale, axis }) in parts.iter().enumerate() {
         let (input, output) = (&inputs[at], &outputs[at]);
         let differs = |what: &str| {
             Err(format!("the FRF from `{input}` to `{output}` has another {what} than the first"))

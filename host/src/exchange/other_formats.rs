@@ -40,7 +40,7 @@ impl Contents {
 
 /// A known format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
+enum KnownFormat {
     Matlab5,
     Matlab73,
     Hdf5,
@@ -59,39 +59,39 @@ const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// A line of Python that opens a file, and the expression for one of its arrays.
 type PythonLines = (String, fn(&str) -> String);
 
-impl Format {
-    fn of(first: &[u8]) -> Option<Format> {
+impl KnownFormat {
+    fn of(first: &[u8]) -> Option<KnownFormat> {
         let begins = |with: &[u8]| first.starts_with(with);
         let text = first.trim_ascii_start();
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
         let hdf5 = begins(HDF5) || first.get(512..).is_some_and(|rest| rest.starts_with(HDF5));
         Some(match () {
-            () if begins(b"MATLAB 7.3") => Format::Matlab73,
-            () if begins(b"MATLAB ") => Format::Matlab5,
-            () if hdf5 => Format::Hdf5,
-            () if begins(b"TDSm") || begins(b"TDSh") => Format::Tdms,
-            () if text.starts_with(b"LabVIEW Measurement") => Format::LabView,
-            () if begins(b"\x93NUMPY") => Format::Npy,
-            () if begins(b"RIFF") && first.get(8..12) == Some(b"WAVE") => Format::Wave,
-            () if begins(b"PAR1") => Format::Parquet,
-            () if begins(b"\xff\xfe") || begins(b"\xfe\xff") => Format::Utf16,
-            () if is_universal(first) => Format::Universal,
+            () if begins(b"MATLAB 7.3") => KnownFormat::Matlab73,
+            () if begins(b"MATLAB ") => KnownFormat::Matlab5,
+            () if hdf5 => KnownFormat::Hdf5,
+            () if begins(b"TDSm") || begins(b"TDSh") => KnownFormat::Tdms,
+            () if text.starts_with(b"LabVIEW Measurement") => KnownFormat::LabView,
+            () if begins(b"\x93NUMPY") => KnownFormat::Npy,
+            () if begins(b"RIFF") && first.get(8..12) == Some(b"WAVE") => KnownFormat::Wave,
+            () if begins(b"PAR1") => KnownFormat::Parquet,
+            () if begins(b"\xff\xfe") || begins(b"\xfe\xff") => KnownFormat::Utf16,
+            () if is_universal(first) => KnownFormat::Universal,
             () => return None,
         })
     }
 
     fn name(self) -> &'static str {
         match self {
-            Format::Matlab5 => "a MATLAB file",
-            Format::Matlab73 => "a MATLAB file of version 7.3, which is HDF5",
-            Format::Hdf5 => "an HDF5 file",
-            Format::Tdms => "a TDMS file of LabVIEW",
-            Format::LabView => "a LabVIEW measurement file (LVM)",
-            Format::Npy => "a single numpy array (.npy)",
-            Format::Wave => "a WAVE sound file",
-            Format::Parquet => "a Parquet file",
-            Format::Utf16 => "text in UTF-16",
-            Format::Universal => "a universal file",
+            KnownFormat::Matlab5 => "a MATLAB file",
+            KnownFormat::Matlab73 => "a MATLAB file of version 7.3, which is HDF5",
+            KnownFormat::Hdf5 => "an HDF5 file",
+            KnownFormat::Tdms => "a TDMS file of LabVIEW",
+            KnownFormat::LabView => "a LabVIEW measurement file (LVM)",
+            KnownFormat::Npy => "a single numpy array (.npy)",
+            KnownFormat::Wave => "a WAVE sound file",
+            KnownFormat::Parquet => "a Parquet file",
+            KnownFormat::Utf16 => "text in UTF-16",
+            KnownFormat::Universal => "a universal file",
         }
     }
 
@@ -99,22 +99,24 @@ impl Format {
     /// by its name.
     fn python(self, file: &str) -> Option<PythonLines> {
         Some(match self {
-            Format::Matlab5 => (format!("import numpy, scipy.io; m = scipy.io.loadmat({file})"), |name| {
-                format!("m[\"{name}\"]")
-            }),
+            KnownFormat::Matlab5 => {
+                (format!("import numpy, scipy.io; m = scipy.io.loadmat({file})"), |name| {
+                    format!("m[\"{name}\"]")
+                })
+            }
             // MATLAB stores arrays with the axes reversed
-            Format::Matlab73 => {
+            KnownFormat::Matlab73 => {
                 (format!("import numpy, h5py; m = h5py.File({file})"), |name| format!("m[\"{name}\"][()].T"))
             }
-            Format::Hdf5 => {
+            KnownFormat::Hdf5 => {
                 (format!("import numpy, h5py; m = h5py.File({file})"), |name| format!("m[\"{name}\"][()]"))
             }
-            Format::Tdms => {
+            KnownFormat::Tdms => {
                 (format!("import numpy, nptdms; m = nptdms.TdmsFile.read({file})[\"GROUP\"]"), |name| {
                     format!("m[\"{name}\"][:]")
                 })
             }
-            Format::LabView => {
+            KnownFormat::LabView => {
                 (format!("import numpy, lvm_read; m = lvm_read.read({file})[0][\"data\"].T"), |name| {
                     match name {
                         "force" | "f" => "m[1]".into(),
@@ -122,11 +124,11 @@ impl Format {
                     }
                 })
             }
-            Format::Npy => (format!("import numpy; m = numpy.load({file})"), |name| match name {
+            KnownFormat::Npy => (format!("import numpy; m = numpy.load({file})"), |name| match name {
                 "force" | "f" => "m[0]".into(),
                 _ => "m[1:]".into(),
             }),
-            Format::Wave => {
+            KnownFormat::Wave => {
                 (format!("import numpy, scipy.io.wavfile; fs, m = scipy.io.wavfile.read({file})"), |name| {
                     match name {
                         "force" | "f" => "SENSITIVITY*m[:, 0]".into(),
@@ -134,10 +136,12 @@ impl Format {
                     }
                 })
             }
-            Format::Parquet => (format!("import numpy, pandas; m = pandas.read_parquet({file})"), |name| {
-                format!("m[\"{name}\"].to_numpy()")
-            }),
-            Format::Utf16 | Format::Universal => return None,
+            KnownFormat::Parquet => {
+                (format!("import numpy, pandas; m = pandas.read_parquet({file})"), |name| {
+                    format!("m[\"{name}\"].to_numpy()")
+                })
+            }
+            KnownFormat::Utf16 | KnownFormat::Universal => return None,
         })
     }
 }
@@ -153,15 +157,15 @@ fn is_universal(first: &[u8]) -> bool {
 /// The message for a file of a known format that is not read as `wanted`, from its first bytes;
 /// `None` for any other file.
 fn said(path: &Path, first: &[u8], wanted: Contents) -> Option<String> {
-    let format = Format::of(first)?;
+    let format = KnownFormat::of(first)?;
     let name = format.name();
     let file = |path: &Path| format!("{:?}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy());
     match (format, wanted) {
-        (Format::Universal, Contents::Loop) => Some(format!(
+        (KnownFormat::Universal, Contents::Loop) => Some(format!(
             "it is {name}, and a loop is read from npz: numpy.savez with the arrays of docs/own-data.md"
         )),
-        (Format::Universal, _) => None,
-        (Format::Utf16, _) => Some(format!("it is {name}: save it as UTF-8 or ASCII")),
+        (KnownFormat::Universal, _) => None,
+        (KnownFormat::Utf16, _) => Some(format!("it is {name}: save it as UTF-8 or ASCII")),
         _ => {
             let (open, array) = format.python(&file(path))?;
             let npz = file(&path.with_extension("npz"));

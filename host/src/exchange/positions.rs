@@ -6,7 +6,7 @@
 //!
 //! Reads a geometry in any of its file formats.
 
-use super::tables::{Cell, Tables, csv_tables, workbook_tables};
+use super::tables::{SheetCell, Tables, csv_tables, workbook_tables};
 use crate::substructuring::geometry::{Configuration, FARTHEST_M, Geometry, Grouping, Point};
 use crate::{advice, foreign};
 use std::collections::BTreeMap;
@@ -46,7 +46,7 @@ pub enum PositionsError {
     },
     /// A cell is wrong.
     #[error("{}, sheet `{sheet}`, row {row}, column `{column}`: {reason}", path.display())]
-    Cell {
+    SheetCell {
         /// The workbook.
         path: PathBuf,
         /// The sheet.
@@ -96,7 +96,7 @@ const SHEETS: [&str; 8] = [
 pub fn read_positions(path: &Path) -> Result<Positions, PositionsError> {
     let tables = if path.is_dir() { csv_tables(path, &SHEETS) } else { workbook_tables(path, &SHEETS) };
     let tables = tables.map_err(|reason| PositionsError::Open { path: path.into(), reason })?;
-    let mut reading = Reading { path, tables, warnings: Vec::new() };
+    let mut reading = PositionsReader { path, tables, warnings: Vec::new() };
     let a = reading.configuration("A")?;
     let b = reading.configuration("B")?;
     let ajb = reading.configuration("AJB")?;
@@ -113,7 +113,7 @@ pub fn read_positions(path: &Path) -> Result<Positions, PositionsError> {
     })
 }
 
-struct Reading<'a> {
+struct PositionsReader<'a> {
     path: &'a Path,
     tables: Tables,
     warnings: Vec<String>,
@@ -128,7 +128,7 @@ struct Sheet<'a> {
 
 impl Sheet<'_> {
     fn fail(&self, row: usize, column: &str, reason: impl Into<String>) -> PositionsError {
-        PositionsError::Cell {
+        PositionsError::SheetCell {
             path: self.path.into(),
             sheet: self.name.into(),
             row,
@@ -137,36 +137,36 @@ impl Sheet<'_> {
         }
     }
 
-    fn at<'c>(&self, cells: &'c [Cell], column: &str) -> Result<&'c Cell, PositionsError> {
+    fn at<'c>(&self, cells: &'c [SheetCell], column: &str) -> Result<&'c SheetCell, PositionsError> {
         let place =
             self.headings.get(&column.to_lowercase()).ok_or_else(|| PositionsError::MissingColumn {
                 path: self.path.into(),
                 sheet: self.name.into(),
                 column: column.into(),
             })?;
-        Ok(cells.get(*place).unwrap_or(&Cell::Empty))
+        Ok(cells.get(*place).unwrap_or(&SheetCell::Empty))
     }
 
-    fn text(&self, row: usize, cells: &[Cell], column: &str) -> Result<String, PositionsError> {
+    fn text(&self, row: usize, cells: &[SheetCell], column: &str) -> Result<String, PositionsError> {
         match self.at(cells, column)? {
-            Cell::Empty => Err(self.fail(row, column, "is empty, a text is needed")),
-            Cell::Text(text) => Ok(text.trim().to_string()),
-            Cell::Number(v) => Ok(v.to_string()),
+            SheetCell::Empty => Err(self.fail(row, column, "is empty, a text is needed")),
+            SheetCell::Text(text) => Ok(text.trim().to_string()),
+            SheetCell::Number(v) => Ok(v.to_string()),
         }
     }
 
-    fn number(&self, row: usize, cells: &[Cell], column: &str) -> Result<f64, PositionsError> {
+    fn number(&self, row: usize, cells: &[SheetCell], column: &str) -> Result<f64, PositionsError> {
         let value = match self.at(cells, column)? {
-            Cell::Empty => return Err(self.fail(row, column, "is empty, a number is needed")),
-            Cell::Number(v) => *v,
-            Cell::Text(text) => text.trim().parse().map_err(|_| {
+            SheetCell::Empty => return Err(self.fail(row, column, "is empty, a number is needed")),
+            SheetCell::Number(v) => *v,
+            SheetCell::Text(text) => text.trim().parse().map_err(|_| {
                 self.fail(row, column, format!("`{text}` is no number (decimal point, no unit)"))
             })?,
         };
         if value.is_finite() { Ok(value) } else { Err(self.fail(row, column, format!("is {value}"))) }
     }
 
-    fn vector(&self, row: usize, cells: &[Cell], stem: &str) -> Result<[f64; 3], PositionsError> {
+    fn vector(&self, row: usize, cells: &[SheetCell], stem: &str) -> Result<[f64; 3], PositionsError> {
         let mut vector = [0.0; 3];
         for (i, v) in vector.iter_mut().enumerate() {
             *v = self.number(row, cells, &format!("{stem}_{}", i + 1))?;
@@ -175,7 +175,7 @@ impl Sheet<'_> {
     }
 }
 
-impl Reading<'_> {
+impl PositionsReader<'_> {
     fn configuration(&mut self, name: &str) -> Result<Configuration, PositionsError> {
         Ok(Configuration {
             channels: self.points(&format!("Channels_{name}"))?,
@@ -189,13 +189,13 @@ impl Reading<'_> {
             sheet: sheet_name.into(),
             available: self.tables.available.join(", "),
         })?;
-        let mut rows = table.iter().filter(|(_, cells)| cells.iter().any(|c| *c != Cell::Empty));
+        let mut rows = table.iter().filter(|(_, cells)| cells.iter().any(|c| *c != SheetCell::Empty));
         let headings = rows.next().map(|(_, cells)| cells.as_slice()).unwrap_or_default();
         let headings = headings
             .iter()
             .enumerate()
             .filter_map(|(i, c)| match c {
-                Cell::Text(text) => Some((text.trim().to_lowercase(), i)),
+                SheetCell::Text(text) => Some((text.trim().to_lowercase(), i)),
                 _ => None,
             })
             .collect();
@@ -269,10 +269,14 @@ impl Reading<'_> {
     }
 }
 
-fn point(sheet: &Sheet<'_>, row: usize, cells: &[Cell]) -> Result<(Point, Option<String>), PositionsError> {
+fn point(
+    sheet: &Sheet<'_>,
+    row: usize,
+    cells: &[SheetCell],
+) -> Result<(Point, Option<String>), PositionsError> {
     let name = sheet.text(row, cells, "Name")?;
     let description = match sheet.at(cells, "Description")? {
-        Cell::Empty => name.clone(),
+        SheetCell::Empty => name.clone(),
         _ => sheet.text(row, cells, "Description")?,
     };
     let number = sheet.number(row, cells, "Grouping")?;

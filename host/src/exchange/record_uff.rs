@@ -77,7 +77,7 @@ struct Signal<'c> {
 }
 
 /// A hit: the force first, then the responses.
-type Hit<'c> = Vec<Signal<'c>>;
+type HitFunctions<'c> = Vec<Signal<'c>>;
 
 /// Extracts the impact records from the contents of a universal file.
 ///
@@ -101,7 +101,7 @@ pub fn by_label(
     is_known: &dyn Fn(&str) -> bool,
 ) -> Result<(Vec<LabelledRecords>, Vec<String>), String> {
     let (hits, notes) = hits(contents)?;
-    let mut rows: Vec<(String, String, Vec<Hit<'_>>)> = Vec::new();
+    let mut rows: Vec<(String, String, Vec<HitFunctions<'_>>)> = Vec::new();
     let mut row_of: HashMap<(String, String), usize> = HashMap::new();
     let named = |dof: &Dof| {
         name_of(dof).map(|Label { entity, name, .. }| if is_known(&entity) { entity } else { name })
@@ -110,7 +110,7 @@ pub fn by_label(
         let force = &hit[0];
         let impact = named(&force.function.response)
             .ok_or_else(|| format!("the force of hit {number} names neither entity nor node"))?;
-        let mut own: Vec<(String, Hit<'_>)> = Vec::new();
+        let mut own: Vec<(String, HitFunctions<'_>)> = Vec::new();
         for response in &hit[1..] {
             let name = named(&response.function.response)
                 .ok_or_else(|| format!("a response of hit {number} names neither entity nor node"))?;
@@ -158,9 +158,9 @@ fn name_of(dof: &Dof) -> Option<Label> {
     (!own.entity.is_empty() || dof.node != 0).then_some(own)
 }
 
-fn hits(contents: &Contents) -> Result<(Vec<Hit<'_>>, Vec<String>), String> {
+fn hits(contents: &Contents) -> Result<(Vec<HitFunctions<'_>>, Vec<String>), String> {
     let notes = frf_uff::left_out(contents);
-    let mut hits: Vec<Hit<'_>> = Vec::new();
+    let mut hits: Vec<HitFunctions<'_>> = Vec::new();
     let mut before = 0;
     for (function, system) in with_units(contents)? {
         let (kind::TIME, Values::Real(values)) = (function.kind, &function.values) else { continue };
@@ -198,7 +198,7 @@ fn hits(contents: &Contents) -> Result<(Vec<Hit<'_>>, Vec<String>), String> {
 }
 
 /// Combines hits with the same force point and the same responses.
-fn records(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<RecordFile, String> {
+fn records(hits: &[HitFunctions<'_>], stated: &StatedUnits) -> Result<RecordFile, String> {
     let Some(first) = hits.first() else { return Err("there is no hit".into()) };
     let (channels, samples) = (first.len() - 1, first[0].values.len());
     let quantity = motion(hits, stated)?;
@@ -210,7 +210,7 @@ fn records(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<RecordFile, String>
     };
     let mut timing = Timing::default();
     let mut scaled = (Vec::new(), Vec::new());
-    let struck = |hit: &Hit<'_>| {
+    let struck = |hit: &HitFunctions<'_>| {
         let Label { entity, name, direction } = label(&hit[0].function.response);
         (if entity.is_empty() { name } else { entity }, direction)
     };
@@ -411,7 +411,7 @@ impl Timing {
 
 /// The quantity that all responses measure: by their types or, where the type is unknown, by their
 /// unit.
-fn motion(hits: &[Hit<'_>], stated: &StatedUnits) -> Result<MotionQuantity, String> {
+fn motion(hits: &[HitFunctions<'_>], stated: &StatedUnits) -> Result<MotionQuantity, String> {
     let mut found: Vec<i64> = Vec::new();
     for signal in hits.iter().flat_map(|hit| &hit[1..]) {
         let axis = &signal.function.axes[1];

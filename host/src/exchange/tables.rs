@@ -18,14 +18,14 @@ use zip::ZipArchive;
 
 /// A cell: text as written, or a number.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Cell {
+pub(super) enum SheetCell {
     Empty,
     Text(String),
     Number(f64),
 }
 
 /// Rows of one sheet, each with its row number in the spreadsheet.
-pub(super) type Table = Vec<(usize, Vec<Cell>)>;
+pub(super) type Table = Vec<(usize, Vec<SheetCell>)>;
 
 /// The requested tables, and the names of all tables found.
 #[derive(Debug, Default)]
@@ -58,9 +58,9 @@ impl Room {
     /// Puts a cell into a row. `at` returns the place for an error message.
     fn put(
         &mut self,
-        row: &mut Vec<Cell>,
+        row: &mut Vec<SheetCell>,
         column: usize,
-        cell: Cell,
+        cell: SheetCell,
         at: impl Fn() -> String,
     ) -> Result<(), String> {
         let of_geometry = "a geometry has a row for each channel or impact: clear what is beside its table";
@@ -68,14 +68,14 @@ impl Room {
             return Err(format!("{}: column {} of at most {MOST_COLUMNS}; {of_geometry}", at(), column + 1));
         }
         let added = (column + 1).saturating_sub(row.len());
-        let text = if let Cell::Text(text) = &cell { text.len() } else { 0 };
+        let text = if let SheetCell::Text(text) = &cell { text.len() } else { 0 };
         let (Some(cells), Some(text)) = (self.cells.checked_sub(added), self.text.checked_sub(text)) else {
             let most = megabytes(MOST_TEXT as u64);
             return Err(format!("{}: more than {MOST_CELLS} cells, or {most} of text; {of_geometry}", at()));
         };
         (self.cells, self.text) = (cells, text);
         if added > 0 {
-            row.resize(column + 1, Cell::Empty);
+            row.resize(column + 1, SheetCell::Empty);
         }
         row[column] = cell;
         Ok(())
@@ -143,16 +143,16 @@ struct TooLong;
 
 /// The contents of a cell; `None` if it is blank. Many cells may refer to one text that the
 /// workbook stores once, so its length is checked before it is copied.
-fn of_workbook(data: &DataRef<'_>, room: &Room) -> Result<Option<Cell>, TooLong> {
+fn of_workbook(data: &DataRef<'_>, room: &Room) -> Result<Option<SheetCell>, TooLong> {
     let text = |text: &str| match text.len() <= room.text {
         true if text.trim().is_empty() => Ok(None),
-        true => Ok(Some(Cell::Text(text.into()))),
+        true => Ok(Some(SheetCell::Text(text.into()))),
         false => Err(TooLong),
     };
     match data {
         DataRef::Empty => Ok(None),
-        DataRef::Float(value) => Ok(Some(Cell::Number(*value))),
-        DataRef::Int(value) => Ok(Some(Cell::Number(*value as f64))),
+        DataRef::Float(value) => Ok(Some(SheetCell::Number(*value))),
+        DataRef::Int(value) => Ok(Some(SheetCell::Number(*value as f64))),
         DataRef::String(owned) => text(owned),
         DataRef::SharedString(shared) => text(shared),
         other => text(&calamine::Data::from(other.clone()).to_string()),
@@ -225,12 +225,12 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
         let mut cells = Vec::new();
         for (column, text) in record.iter().enumerate() {
             let cell = match text.trim_start_matches('\u{feff}').trim() {
-                "" => Cell::Empty,
+                "" => SheetCell::Empty,
                 // the first line with which a spreadsheet program declares its delimiter
-                text if table.is_empty() && text.to_lowercase().starts_with("sep=") => Cell::Empty,
+                text if table.is_empty() && text.to_lowercase().starts_with("sep=") => SheetCell::Empty,
                 text => match decimal(text, delimiter) {
-                    Some(number) => Cell::Number(number),
-                    None => Cell::Text(text.into()),
+                    Some(number) => SheetCell::Number(number),
+                    None => SheetCell::Text(text.into()),
                 },
             };
             room.put(&mut cells, column, cell, at)?;

@@ -91,7 +91,7 @@ pub(super) fn with_units(contents: &Contents) -> Result<Vec<(&Function, Option<U
 }
 
 /// The unit of one axis: its factor to SI, and its description for messages.
-struct Told {
+struct AxisUnit {
     factor: f64,
     /// For a motion per force: the part of the factor that comes from the force.
     per_force: Option<f64>,
@@ -100,7 +100,7 @@ struct Told {
 }
 
 /// An axis, and what determines its unit.
-struct Place<'a> {
+struct LabelledAxis<'a> {
     /// `ordinate`, `denominator`, `abscissa`.
     name: &'a str,
     axis: &'a Axis,
@@ -110,13 +110,13 @@ struct Place<'a> {
     key: &'a str,
 }
 
-impl Place<'_> {
+impl LabelledAxis<'_> {
     /// Its unit, of the first of the dimensions `wanted` that fits.
-    fn unit(&self, wanted: &[Dimension]) -> Result<Told, String> {
-        let Place { name, axis, system, stated, key } = self;
+    fn unit(&self, wanted: &[Dimension]) -> Result<AxisUnit, String> {
+        let LabelledAxis { name, axis, system, stated, key } = self;
         let made = |unit: Unit, words: String| {
             let is_ratio = wanted.contains(&unit.dimension) && unit.dimension.is_per_force();
-            Told {
+            AxisUnit {
                 factor: unit.factor,
                 per_force: is_ratio.then_some(unit.of_force),
                 dimension: unit.dimension,
@@ -135,7 +135,7 @@ impl Place<'_> {
                 Some(_) => (1.0, "SI by data set 164".into()),
                 None => (1.0, "SI, for want of a label".into()),
             };
-            return Ok(Told { factor, per_force: None, dimension, words });
+            return Ok(AxisUnit { factor, per_force: None, dimension, words });
         };
         let unit = Unit::parse(label, wanted).map_err(|error| {
             format!(
@@ -248,7 +248,7 @@ pub(super) fn frf_scale(
     let [_, ordinate, denominator, _] = &f.axes;
     let motions = motions(ordinate)?;
     let note = is_force(denominator, stated)?;
-    let place = |name, axis, stated, key| Place { name, axis, system, stated, key };
+    let place = |name, axis, stated, key| LabelledAxis { name, axis, system, stated, key };
     let top = place("ordinate", ordinate, stated.response.as_deref(), "response");
     let own = wanted_of(&motions, rotates(f));
     let ratios: Vec<Dimension> = own.iter().map(|d| d.per_force()).collect();
@@ -319,7 +319,8 @@ pub(super) fn time_scale(axis: &Axis, stated: &StatedUnits) -> Result<(f64, Opti
     if ![quantity::TIME, quantity::UNKNOWN].contains(&axis.quantity) && stated.time.is_none() {
         return Err(format!("the abscissa is of type {}: 17 (time) is needed", type_name(axis.quantity)));
     }
-    let place = Place { name: "abscissa", axis, system: None, stated: stated.time.as_deref(), key: "time" };
+    let place =
+        LabelledAxis { name: "abscissa", axis, system: None, stated: stated.time.as_deref(), key: "time" };
     let unit = place.unit(&[Dimension::TIME])?;
     Ok((unit.factor, (unit.factor != 1.0).then(|| format!("time in {}", unit.words))))
 }
@@ -330,8 +331,13 @@ pub(super) fn force_scale(
     system: Option<&UnitSystem>,
     stated: &StatedUnits,
 ) -> Result<(f64, String), String> {
-    let place =
-        Place { name: "force", axis: &f.axes[1], system, stated: stated.force.as_deref(), key: "force" };
+    let place = LabelledAxis {
+        name: "force",
+        axis: &f.axes[1],
+        system,
+        stated: stated.force.as_deref(),
+        key: "force",
+    };
     place.unit(&[Dimension::FORCE]).map(|unit| (unit.factor, unit.words))
 }
 
@@ -344,7 +350,7 @@ pub(super) fn motion_scale(
     let axis = &f.axes[1];
     let motions = motions(axis)?;
     let stated = stated.response.as_deref();
-    let place = Place { name: "response", axis, system, stated, key: "response" };
+    let place = LabelledAxis { name: "response", axis, system, stated, key: "response" };
     let unit = place.unit(&wanted_of(&motions, rotates(f)))?;
     let motion = decided(&motions, unit.dimension, stated.is_some() || told(&axis.unit).is_some())?;
     Ok(Scale {

@@ -179,7 +179,7 @@ impl Unit {
         let capitals = !plain.chars().any(char::is_lowercase);
         let mut found = None;
         for products_first in [true, false] {
-            let mut reading = Reading { rest: &plain, products_first, capitals, depth: 0 };
+            let mut reading = LabelParser { rest: &plain, products_first, capitals, depth: 0 };
             let (factor, dimension, of_force) = reading.quotient()?;
             if !reading.rest.is_empty() {
                 return Err(UnitError::Malformed);
@@ -252,7 +252,7 @@ fn times(one: Product, other: Product, power: i8) -> Result<Product, UnitError> 
 }
 
 /// Parser state of a label. Grammar: quotients of products of powers of symbols.
-struct Reading<'t> {
+struct LabelParser<'t> {
     rest: &'t str,
     /// Whether a product binds more tightly than a quotient: `m/s N` is m/(s N).
     products_first: bool,
@@ -264,7 +264,7 @@ struct Reading<'t> {
 /// Deepest nesting of brackets; units have one or two.
 const MOST_DEPTH: u8 = 8;
 
-impl Reading<'_> {
+impl LabelParser<'_> {
     fn skip_blanks(&mut self) {
         self.rest = self.rest.trim_start();
     }
@@ -376,24 +376,24 @@ const PREFIX_WORDS: [(&str, f64); 6] =
     [("nano", 1e-9), ("micro", 1e-6), ("milli", 1e-3), ("centi", 1e-2), ("kilo", 1e3), ("mega", 1e6)];
 
 /// A row of the table: names, factor to SI, dimension, and whether SI prefixes are allowed.
-struct Known {
+struct KnownUnit {
     names: &'static [&'static str],
     factor: f64,
     dimension: Dimension,
     prefixed: bool,
 }
 
-const fn si(names: &'static [&'static str], dimension: Dimension) -> Known {
-    Known { names, factor: 1.0, dimension, prefixed: true }
+const fn si(names: &'static [&'static str], dimension: Dimension) -> KnownUnit {
+    KnownUnit { names, factor: 1.0, dimension, prefixed: true }
 }
 
-const fn other(names: &'static [&'static str], factor: f64, dimension: Dimension) -> Known {
-    Known { names, factor, dimension, prefixed: false }
+const fn other(names: &'static [&'static str], factor: f64, dimension: Dimension) -> KnownUnit {
+    KnownUnit { names, factor, dimension, prefixed: false }
 }
 
 /// Every known unit. A full name takes precedence over a prefix and a name: `min` is a minute, `kg`
 /// a kilogram, `ft` a foot.
-const TABLE: &[Known] = &[
+const TABLE: &[KnownUnit] = &[
     si(&["m", "metre", "meter", "metres", "meters"], Dimension::DISPLACEMENT),
     si(&["s", "sec", "secs", "second", "seconds"], Dimension::TIME),
     si(&["N", "newton", "newtons"], Dimension::FORCE),
@@ -415,14 +415,14 @@ const TABLE: &[Known] = &[
     other(&["ips"], INCH, Dimension::VELOCITY),
     other(&["fps"], 12.0 * INCH, Dimension::VELOCITY),
     other(&["mps"], 1.0, Dimension::VELOCITY),
-    Known {
+    KnownUnit {
         names: &["g", "gn", "g_n", "G", "gee"],
         factor: GRAVITY,
         dimension: Dimension::ACCELERATION,
         prefixed: true,
     },
     other(&["g0", "grav"], GRAVITY, Dimension::ACCELERATION),
-    Known { names: &["Gal", "gal"], factor: 1e-2, dimension: Dimension::ACCELERATION, prefixed: true },
+    KnownUnit { names: &["Gal", "gal"], factor: 1e-2, dimension: Dimension::ACCELERATION, prefixed: true },
     // force
     other(&["lbf", "lb", "lbs", "pound", "pounds"], POUND, Dimension::FORCE),
     other(&["klbf", "klb", "kip", "kips"], 1e3 * POUND, Dimension::FORCE),
@@ -461,7 +461,7 @@ fn symbol(name: &str, capitals: bool) -> Result<Product, UnitError> {
 
 /// The unit of this name; `same` compares names.
 fn exactly(name: &str, same: impl Fn(&str, &str) -> bool) -> Option<Product> {
-    let product = |row: &Known, prefix: f64| {
+    let product = |row: &KnownUnit, prefix: f64| {
         let factor = prefix * row.factor;
         (factor, row.dimension, if row.dimension.force == 0 { 1.0 } else { factor })
     };

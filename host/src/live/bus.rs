@@ -25,7 +25,7 @@ pub struct Numbered {
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct BusState {
     seq: u64,
     recent: VecDeque<Numbered>,
     whole: Snapshot,
@@ -34,7 +34,7 @@ struct State {
 /// Distributes all messages.
 #[derive(Debug)]
 pub struct Bus {
-    state: Mutex<State>,
+    state: Mutex<BusState>,
     newest: watch::Sender<u64>,
 }
 
@@ -52,7 +52,7 @@ impl Bus {
         bus
     }
 
-    fn inner(&self) -> MutexGuard<'_, State> {
+    fn inner(&self) -> MutexGuard<'_, BusState> {
         // valid even after a poisoned lock: it holds complete messages only
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -125,14 +125,14 @@ impl Bus {
 
 /// A message with its number, for serialisation.
 #[derive(Serialize)]
-struct Written<'a> {
+struct NumberedMessage<'a> {
     seq: u64,
     #[serde(flatten)]
     message: &'a Message,
 }
 
 fn numbered(seq: u64, message: &Message) -> Numbered {
-    let text = serde_json::to_string(&Written { seq, message }).unwrap_or_default();
+    let text = serde_json::to_string(&NumberedMessage { seq, message }).unwrap_or_default();
     // escaped, because it includes names from devices and plans
     Numbered { seq, text: shown_json(&text).into() }
 }

@@ -22,7 +22,7 @@ const MOST_CODES: usize = 1 << 18;
 
 /// One report.
 #[derive(Clone, Debug)]
-pub enum Told {
+pub enum WatchReport {
     /// A stream with these channels began; the flag is true for a simulated rig.
     Stream(Arc<ChannelMap>, bool),
     /// Hammer and laser move to a cell.
@@ -85,14 +85,14 @@ pub struct Cycles {
 
 /// The sending end, used by the measuring thread.
 pub struct Eye {
-    queue: SyncSender<Told>,
+    queue: SyncSender<WatchReport>,
     cycles: Arc<Mutex<Cycles>>,
 }
 
 /// The receiving end.
 pub struct Ear {
     /// The reports.
-    pub queue: Receiver<Told>,
+    pub queue: Receiver<WatchReport>,
     cycles: Arc<Mutex<Cycles>>,
 }
 
@@ -122,7 +122,7 @@ impl Ear {
 }
 
 impl Eye {
-    fn tell(&self, told: Told) {
+    fn tell(&self, told: WatchReport) {
         // if the queue is full, a later report updates the page
         let _ = self.queue.try_send(told);
     }
@@ -143,34 +143,37 @@ impl Watch for Eye {
     fn saw(&self, seen: &Seen<'_>) {
         match *seen {
             Seen::Stream { channels, simulated } => {
-                self.tell(Told::Stream(Arc::new(channels.clone()), simulated));
+                self.tell(WatchReport::Stream(Arc::new(channels.clone()), simulated));
             }
-            Seen::Moving { row, standing, by_hand, .. } => self.tell(Told::Moving {
+            Seen::Moving { row, standing, by_hand, .. } => self.tell(WatchReport::Moving {
                 cell: row.id,
                 kept: standing.kept,
                 attempt: standing.attempts,
                 by_hand,
             }),
-            Seen::Settling { row, standing, most_s, by_hand } => self.tell(Told::Settling {
+            Seen::Settling { row, standing, most_s, by_hand } => self.tell(WatchReport::Settling {
                 cell: row.id,
                 kept: standing.kept,
                 attempt: standing.attempts,
                 most_s,
                 by_hand,
             }),
-            Seen::Recording => self.tell(Told::Recording),
-            Seen::Judging => self.tell(Told::Judging),
-            Seen::Link(accounts) => self.tell(Told::Link(accounts)),
+            Seen::Recording => self.tell(WatchReport::Recording),
+            Seen::Judging => self.tell(WatchReport::Judging),
+            Seen::Link(accounts) => self.tell(WatchReport::Link(accounts)),
             Seen::Level { level, limits, most_drive_v, load_cells } => {
                 let (limits, load_cells) = (limits.to_vec(), load_cells.to_vec());
-                self.tell(Told::Level { level: *level, limits, most_drive_v, load_cells });
+                self.tell(WatchReport::Level { level: *level, limits, most_drive_v, load_cells });
             }
             Seen::Shaking(shaking) => {
                 self.keep(shaking.codes);
-                self.tell(Told::Window([shaking.at_s, shaking.amplitude, shaking.drive_v], shaking.settled));
+                self.tell(WatchReport::Window(
+                    [shaking.at_s, shaking.amplitude, shaking.drive_v],
+                    shaking.settled,
+                ));
             }
-            Seen::LevelOver { recorded, say } => self.tell(Told::LevelOver(recorded, say.into())),
-            Seen::Ended => self.tell(Told::Ended),
+            Seen::LevelOver { recorded, say } => self.tell(WatchReport::LevelOver(recorded, say.into())),
+            Seen::Ended => self.tell(WatchReport::Ended),
             // the campaign file contains the rest
             Seen::Begun { .. } | Seen::Moved | Seen::Judged { .. } | Seen::Remark(_) => {}
         }

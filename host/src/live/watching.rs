@@ -5,7 +5,7 @@
 //! are computed from stored data.
 
 use super::bus::Bus;
-use super::eye::{Ear, Told, room};
+use super::eye::{Ear, WatchReport, room};
 use super::frames::Frames;
 use super::message::Message;
 use super::now::{Disk, Doing, Limit, Link, Shaker, Signals, State, StreamInfo};
@@ -56,7 +56,7 @@ struct Known {
     load_cells: Vec<(usize, f64)>,
     shaker: Option<Shaker>,
     levels: u64,
-    signals: Sums,
+    signals: LevelSums,
     cycles: Vec<i16>,
 }
 
@@ -111,54 +111,55 @@ impl Watching {
                 state = Some(State { what, since_unix_ms: unix_ms(), most_s, cell, kept, attempt });
             };
             match told {
-                Told::Stream(channels, simulated) => {
+                WatchReport::Stream(channels, simulated) => {
                     self.bus.say(Message::Stream(StreamInfo::of(&channels, simulated)));
-                    known.signals = Sums::of(channels.len());
+                    known.signals = LevelSums::of(channels.len());
                     known.channels = Some(channels);
                     now(Doing::Watching, None, None);
                 }
-                Told::Moving { cell, kept, attempt, by_hand } => {
+                WatchReport::Moving { cell, kept, attempt, by_hand } => {
                     let what = if by_hand { Doing::MoveByHand } else { Doing::Moving };
                     now(what, None, Some((cell, kept, attempt)));
                 }
-                Told::Settling { cell, kept, attempt, most_s, by_hand } => {
+                WatchReport::Settling { cell, kept, attempt, most_s, by_hand } => {
                     let what = if by_hand { Doing::StrikeByHand } else { Doing::Settling };
                     now(what, Some(most_s), Some((cell, kept, attempt)));
                 }
                 // the cell is that of the previous state
-                Told::Recording | Told::Judging => {
-                    let what = if matches!(told, Told::Judging) { Doing::Judging } else { Doing::Recording };
+                WatchReport::Recording | WatchReport::Judging => {
+                    let what =
+                        if matches!(told, WatchReport::Judging) { Doing::Judging } else { Doing::Recording };
                     let before = state.take().or_else(|| self.bus.state());
                     state =
                         before.map(|before| State { what, since_unix_ms: unix_ms(), most_s: None, ..before });
                 }
-                Told::Link(accounts) => {
+                WatchReport::Link(accounts) => {
                     link = Some(Link {
                         lost_scans: accounts.lost,
                         recovered_scans: accounts.recovered,
                         received_scans: accounts.received,
                     });
                 }
-                Told::Level { level, limits, most_drive_v, load_cells } => {
+                WatchReport::Level { level, limits, most_drive_v, load_cells } => {
                     known.load_cells = load_cells;
                     known.begin(level, &limits, most_drive_v);
                     now(Doing::Shaking, None, None);
                     shaker = true;
                 }
-                Told::Window(window, settled) => {
+                WatchReport::Window(window, settled) => {
                     if let Some(own) = &mut known.shaker {
                         own.windows.push(window);
                         own.settled = settled;
                         shaker = true;
                     }
                 }
-                Told::LevelOver(recorded, say) => {
+                WatchReport::LevelOver(recorded, say) => {
                     if let Some(own) = &mut known.shaker {
                         own.over = Some((recorded, say));
                         shaker = true;
                     }
                 }
-                Told::Ended => now(Doing::Ended, None, None),
+                WatchReport::Ended => now(Doing::Ended, None, None),
             }
         }
         if self.ear.cycles(&mut known.cycles) {
@@ -230,7 +231,7 @@ impl Known {
 
 /// Signal levels since the last report.
 #[derive(Default)]
-struct Sums {
+struct LevelSums {
     arrived: u64,
     both: Vec<(i64, u64)>,
     peaks: Vec<u16>,
@@ -238,7 +239,7 @@ struct Sums {
     holes: u64,
 }
 
-impl Sums {
+impl LevelSums {
     fn of(channels: usize) -> Self {
         Self {
             both: vec![(0, 0); channels],

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 
 /// The figure as csv (RFC 4180), with a header line.
 pub fn csv(figure: &Figure) -> String {
-    let mut table = Table(Writer::from_writer(Vec::new()));
+    let mut table = CsvTable(Writer::from_writer(Vec::new()));
     table.line(["panel", "curve", "horizontal", "x", "upright", "y", "low", "high"]);
     for (i, panel) in figure.panels.iter().enumerate() {
         let title = if panel.title.is_empty() { (i + 1).to_string() } else { panel.title.clone() };
@@ -20,9 +20,9 @@ pub fn csv(figure: &Figure) -> String {
 /// Not a number: gives an empty cell.
 const NONE: f64 = f64::NAN;
 
-struct Table(Writer<Vec<u8>>);
+struct CsvTable(Writer<Vec<u8>>);
 
-impl Table {
+impl CsvTable {
     fn line(&mut self, cells: [&str; 8]) {
         self.0.write_record(cells).expect("memory takes every line, and all have eight cells");
     }

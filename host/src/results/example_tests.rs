@@ -304,7 +304,7 @@ pub fn results() -> Results {
         [(100.0, 0.0), (200.0, 65.0), (250.0, 2.0)].map(|(f, lag)| shaker_loop(f, lag)).to_vec();
     results.static_arm = Some(Identified {
         correction: crate::hysteresis::Correction { effective_mass_kg: 1.74, parallel_path: 0.0133 },
-        basis: crate::hysteresis::static_arm::Basis::Hits,
+        basis: crate::hysteresis::static_arm::CorrectionSource::Hits,
         residual: 0.004,
     });
     results.reconstruction = Some(reconstruction());

@@ -2,7 +2,7 @@
 
 use jointrig::exchange::{read_frf, read_positions};
 use jointrig::substructuring::averaged::Priors;
-use jointrig::substructuring::fit::{FitError, Fitted, Options, Shape, fit};
+use jointrig::substructuring::fit::{FitError, Fitted, FreeEntries, Options, fit};
 use jointrig::substructuring::{Band, Dof, Frf, Geometry, IdmSet};
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
@@ -63,7 +63,8 @@ fn exact_data_give_the_contact_exactly() {
 
 #[test]
 fn full_matrices_of_exact_data_are_diagonal() {
-    let options = Options { priors: NOWHERE_WRONG, mounting: 0.0, shape: Shape::Full, ..Options::default() };
+    let options =
+        Options { priors: NOWHERE_WRONG, mounting: 0.0, shape: FreeEntries::Full, ..Options::default() };
     let found = Case::rigid(1e-6).fit(IdmSet::Six, &options).expect("exact data");
     let z = found.joint[&Dof::Z].stiffness;
     assert!((z / 180e6 - 1.0).abs() < 1e-4, "{z}");

@@ -6,7 +6,9 @@
 use jointrig::analyse::{Wanted, analyse};
 use jointrig::campaign::plan::PAPER;
 use jointrig::campaign::plan::level::{Held, Level, Moment};
-use jointrig::campaign::run::shaking::{self, Limits, Options, Outcome, ShakeError, Shortfall, Summary};
+use jointrig::campaign::run::shaking::{
+    self, ChannelLimits, LevelOptions, Outcome, ShakeError, Shortfall, Summary,
+};
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::level_table::LevelRow;
 use jointrig::device::address::Address;
@@ -23,14 +25,14 @@ fn step(frequency_hz: f64, amplitude: f64) -> Level {
     Level { frequency_hz, end_hz: None, held: Held::Displacement, amplitude }
 }
 
-fn options(levels: Vec<Level>) -> Options {
-    Options {
+fn options(levels: Vec<Level>) -> LevelOptions {
+    LevelOptions {
         levels,
         moment: Moment::Before,
         seconds: 0.6,
         sweep_hz_per_s: 40.0,
         most_drive_v: None,
-        limits: Limits::default(),
+        limits: ChannelLimits::default(),
         new_structure: false,
         stop: Arc::new(AtomicBool::new(false)),
     }
@@ -61,14 +63,14 @@ impl Bench {
         format!("sim:{}", path.display())
     }
 
-    fn run(&self, address: &str, options: &Options) -> Result<Summary, ShakeError> {
+    fn run(&self, address: &str, options: &LevelOptions) -> Result<Summary, ShakeError> {
         self.run_and_tell(address, options, &mut |_| {})
     }
 
     fn run_and_tell(
         &self,
         address: &str,
-        options: &Options,
+        options: &LevelOptions,
         tell: &mut dyn FnMut(Option<&Outcome>),
     ) -> Result<Summary, ShakeError> {
         let mut store = Store::open(&self.file).unwrap();
@@ -202,7 +204,7 @@ impl Slider {
 fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     let bench = Bench::new();
     let Slider { k, friction, load } = *slider;
-    bench.run(&slider.rig(&bench), &Options { seconds: 1.0, ..options(levels) }).unwrap();
+    bench.run(&slider.rig(&bench), &LevelOptions { seconds: 1.0, ..options(levels) }).unwrap();
     let results = bench.analysed();
     let rows = rows(&results, Force::Raw);
     let levels = rows_of(&bench);
@@ -425,7 +427,7 @@ fn levels_in_the_file_are_skipped_and_an_interrupt_comes_to_rest() {
     let summary = bench.run("sim:", &options(levels.clone())).unwrap();
     assert!(matches!(summary.outcomes[0], Outcome::Known(_)) && stored(&summary) == 2);
     // measured after the cells they are separate levels
-    let after = Options { moment: Moment::After, ..options(levels) };
+    let after = LevelOptions { moment: Moment::After, ..options(levels) };
     assert_eq!(stored(&bench.run("sim:", &after).unwrap()), 3);
     let results = bench.analysed();
     assert_eq!(results.check("contact-unchanged").unwrap().ok, Some(true));
@@ -436,7 +438,7 @@ fn limits_end_the_run_by_name_and_what_is_out_of_reach_only_the_level() {
     let bench = Bench::new();
     let levels = vec![step(250.0, 1e-7), step(300.0, 2e-7)];
     // 250 Hz and 0.1 µm need 0.23 V, 300 Hz and 0.2 µm 1.03 V
-    let weak = Options { most_drive_v: Some(0.5), ..options(levels.clone()) };
+    let weak = LevelOptions { most_drive_v: Some(0.5), ..options(levels.clone()) };
     let summary = bench.run("sim:", &weak).unwrap();
     assert!(matches!(summary.outcomes[1], Outcome::Short(_, Shortfall::Weak { .. })), "{summary:?}");
     assert_eq!(stored(&summary), 1);
@@ -448,9 +450,10 @@ fn limits_end_the_run_by_name_and_what_is_out_of_reach_only_the_level() {
             .name
             .to_string()
     };
-    let limited = Options { limits: Limits(vec![(name.clone(), 2e-4)]), ..options(levels.clone()) };
+    let limited =
+        LevelOptions { limits: ChannelLimits(vec![(name.clone(), 2e-4)]), ..options(levels.clone()) };
     let error = bench.run("sim:", &limited).unwrap_err().to_string();
     assert!(error.contains("300 Hz, 0.2 µm") && error.contains(&name) && error.contains("0.0002"), "{error}");
-    let unknown = Options { limits: Limits(vec![("LDV_Z".into(), 1.0)]), ..options(levels) };
+    let unknown = LevelOptions { limits: ChannelLimits(vec![("LDV_Z".into(), 1.0)]), ..options(levels) };
     assert!(bench.run("sim:", &unknown).unwrap_err().to_string().contains("LDV_Z"));
 }

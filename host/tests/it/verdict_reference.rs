@@ -1,6 +1,6 @@
 //! Verdicts on seven simulated hits of known kind (a quarter of a second of each, one response).
 
-use jointrig::campaign::verdict::{Kind, Limits, judge_all};
+use jointrig::campaign::verdict::{Limits, Verdict, judge_all};
 use jointrig::exchange::read_impacts;
 use serde_json::Value;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn all_seven_kinds_are_told_apart() {
         expected["verdicts"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
     assert_eq!(names, wanted, "{verdicts:#?}");
     for (verdict, peak) in verdicts.iter().zip(expected["peaks_n"].as_array().expect("a list")) {
-        if verdict.kind == Kind::Good {
+        if verdict.kind == Verdict::Good {
             // half sines are not band-limited, and the noise is 0.01 N
             assert!((verdict.peak_n / peak.as_f64().expect("a number") - 1.0).abs() < 5e-3, "{verdict:?}");
         }

@@ -8,7 +8,7 @@ pub(super) const LINES: usize = 11;
 
 /// Description of the values in the header.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
+pub(super) struct ValueShape {
     pub complex: bool,
     pub precision: Precision,
     pub points: usize,
@@ -59,7 +59,7 @@ pub(super) fn dofs(record: &Record<'_>) -> Result<Dofs, Wrong> {
     })
 }
 
-pub(super) fn shape(record: &Record<'_>) -> Result<Shape, Wrong> {
+pub(super) fn shape(record: &Record<'_>) -> Result<ValueShape, Wrong> {
     let fields = record.columns([10, 10, 10, 13, 13, 13]);
     let words = record.words();
     let from = |f: &[&str]| {
@@ -72,7 +72,7 @@ pub(super) fn shape(record: &Record<'_>) -> Result<Shape, Wrong> {
             6 => (true, Precision::Double),
             _ => return None,
         };
-        Some(Shape {
+        Some(ValueShape {
             complex,
             precision,
             points: usize::try_from(integer_at(1)?).ok()?,
@@ -109,7 +109,7 @@ pub(super) fn axis(record: &Record<'_>) -> Result<Axis, Wrong> {
 }
 
 /// The form of data in these lines.
-pub(super) fn shape_of(header: Span<'_>) -> Option<Shape> {
+pub(super) fn shape_of(header: Span<'_>) -> Option<ValueShape> {
     let mut lines = Lines::of(header);
     lines.nth(5)?;
     shape(&lines.text("").ok()?).ok()

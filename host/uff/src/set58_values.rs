@@ -9,10 +9,10 @@ use super::function::{Abscissa, ByteOrder, Encoding, Function, Precision, Values
 use super::lines::{Lines, Span, Words, Wrong};
 use super::number;
 use super::output::Output;
-use super::set58_header::{Shape, shape_of};
+use super::set58_header::{ValueShape, shape_of};
 use num_complex::Complex;
 
-impl Shape {
+impl ValueShape {
     /// Number of numbers per value: its abscissa value if stored, and one or two parts.
     fn numbers(&self) -> usize {
         usize::from(!self.even) + 1 + usize::from(self.complex)
@@ -20,7 +20,7 @@ impl Shape {
 }
 
 /// Widths in bytes of abscissa value and part that a file may have, the most likely first.
-fn widths(shape: &Shape) -> [(usize, usize); 3] {
+fn widths(shape: &ValueShape) -> [(usize, usize); 3] {
     match (shape.precision, shape.even) {
         (Precision::Single, _) => [(4, 4), (8, 8), (8, 4)],
         (Precision::Double, _) => [(8, 8), (4, 8), (4, 4)],
@@ -28,7 +28,7 @@ fn widths(shape: &Shape) -> [(usize, usize); 3] {
 }
 
 /// Bytes of all values with these widths.
-fn bytes_for(shape: &Shape, (place, part): (usize, usize)) -> Option<usize> {
+fn bytes_for(shape: &ValueShape, (place, part): (usize, usize)) -> Option<usize> {
     let places = if shape.even { 0 } else { place };
     shape.points.checked_mul(places + part * (1 + usize::from(shape.complex)))
 }
@@ -49,7 +49,7 @@ pub(super) fn byte_counts(identifier: Span<'_>, header: Span<'_>) -> Vec<usize> 
 /// Values in binary.
 pub(super) fn read_binary(
     data: Span<'_>,
-    shape: &Shape,
+    shape: &ValueShape,
     identifier: Span<'_>,
 ) -> Result<(Abscissa, Values, Encoding), Wrong> {
     let wrong = |reason: String| Wrong { offset: identifier.offset, reason };
@@ -102,7 +102,7 @@ const NARROWEST: usize = 6;
 const NARROW: usize = 1 << 20;
 
 /// Reads values in text: by columns, or by words if the columns are not the standard's.
-pub(super) fn read_text(lines: Lines<'_>, shape: &Shape) -> Result<(Abscissa, Values, Encoding), Wrong> {
+pub(super) fn read_text(lines: Lines<'_>, shape: &ValueShape) -> Result<(Abscissa, Values, Encoding), Wrong> {
     let start = lines.offset();
     let wanted = shape.points.checked_mul(shape.numbers());
     let wrong = |there: &str| {
@@ -137,7 +137,7 @@ const MOST_FILL: usize = 5;
 /// Collects numbers in the order of the file directly into their final arrays, so that there is
 /// never a second copy.
 struct Numbers<'s> {
-    shape: &'s Shape,
+    shape: &'s ValueShape,
     wanted: usize,
     count: usize,
     /// Zeros after the last number that is needed.
@@ -150,7 +150,7 @@ struct Numbers<'s> {
 }
 
 impl<'s> Numbers<'s> {
-    fn new(shape: &'s Shape, wanted: usize) -> Self {
+    fn new(shape: &'s ValueShape, wanted: usize) -> Self {
         let points = wanted / shape.numbers();
         let room = |there: bool| if there { points } else { 0 };
         Numbers {
@@ -189,7 +189,7 @@ impl<'s> Numbers<'s> {
     }
 }
 
-fn abscissa(shape: &Shape, places: Vec<f64>) -> Abscissa {
+fn abscissa(shape: &ValueShape, places: Vec<f64>) -> Abscissa {
     if shape.even {
         Abscissa::Even { start: shape.start, step: shape.step }
     } else {

@@ -10,7 +10,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::NewRecord;
 use jointrig::campaign::store::session_table::{Counters, SessionInfo};
 use jointrig::campaign::store::stored::Hex;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Verdict, Judgement};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::stream::Recording;
 use jointrig::report;
@@ -110,8 +110,8 @@ fn eventful(path: &Path) {
             store.insert(&record(row.id, attempt, session), &Counters::default()).expect("stored");
         }
     }
-    store.overrule(1, Kind::Dropped, "a lorry").expect("dropped");
-    store.overrule(1, Kind::Good, "no lorry").expect("kept");
+    store.overrule(1, Verdict::Dropped, "a lorry").expect("dropped");
+    store.overrule(1, Verdict::Good, "no lorry").expect("kept");
     store.log("a note").expect("noted");
     store.note_temperature(session, 21.5).expect("noted");
     store.set_meta("who", "one").expect("noted");
@@ -148,6 +148,6 @@ fn record(cell: i64, attempt: u32, session: i64) -> NewRecord {
     let codes = force.chain(motion(hz)).chain(motion(1.3 * hz)).chain(motion(1.7 * hz)).collect();
     let recording =
         Recording { epoch: 3, first_scan: 144, trigger_index: 256, channels: 4, codes, gaps: vec![], shot };
-    let verdict = Verdict { peak_n: 49.0, ..Verdict::without_pulse(Kind::Good, 49.0, 30.0, "one clean pulse".into()) };
+    let verdict = Judgement { peak_n: 49.0, ..Judgement::without_pulse(Verdict::Good, 49.0, 30.0, "one clean pulse".into()) };
     NewRecord { cell, attempt, session, utc: "2026-01-01T00:00:00Z".into(), utc_error_s: None, recording, verdict }
 }

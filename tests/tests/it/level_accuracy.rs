@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::plan::level::{Held, Level, Moment};
-use jointrig::campaign::run::shaking::{self, Limits, Options};
+use jointrig::campaign::run::shaking::{self, ChannelLimits, LevelOptions};
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
@@ -74,13 +74,13 @@ fn shake(file: &Path, address: &Address, seed: u64) {
         |(frequency_hz, amplitude)| Level { frequency_hz, end_hz: None, held: Held::Displacement, amplitude };
     let each = |f: f64| planned.amplitudes_m.iter().map(move |amplitude| (f, *amplitude));
     let mut session = Session::open(address.open(seed).unwrap(), "test").unwrap();
-    let of = |level: Level| Options {
+    let of = |level: Level| LevelOptions {
         levels: vec![level],
         moment: Moment::After,
         seconds: 1.0,
         sweep_hz_per_s: 20.0,
         most_drive_v: None,
-        limits: Limits::default(),
+        limits: ChannelLimits::default(),
         new_structure: false,
         stop: Arc::new(AtomicBool::new(false)),
     };

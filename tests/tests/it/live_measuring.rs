@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::store::Store;
-use jointrig::campaign::verdict::Kind;
+use jointrig::campaign::verdict::Verdict;
 use jointrig_tests::browser::{Browser, Look};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{Served, campaign, picture};
@@ -264,9 +264,9 @@ fn a_person_answers_notes_keeps_and_drops_on_the_page() {
         [format!("{newest} dropped"), format!("{newest} good"), format!("{newest} dropped")]
     );
     let records = store.records_of(cell).unwrap();
-    let standing: Vec<Kind> = records.into_iter().map(|record| record.unwrap().standing()).collect();
-    assert_eq!(standing.iter().filter(|kind| **kind == Kind::Good).count(), 2, "{standing:?}");
-    assert!(standing.contains(&Kind::Dropped));
+    let standing: Vec<Verdict> = records.into_iter().map(|record| record.unwrap().standing()).collect();
+    assert_eq!(standing.iter().filter(|kind| **kind == Verdict::Good).count(), 2, "{standing:?}");
+    assert!(standing.contains(&Verdict::Dropped));
 }
 
 #[test]

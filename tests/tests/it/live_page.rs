@@ -5,7 +5,7 @@
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::{NewRecord, RecordRow};
 use jointrig::campaign::store::session_table::Counters;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::device::stream::Recording;
 use jointrig_tests::browser::{Browser, Look, Page};
 use jointrig_tests::campaign::{origins, rows};
@@ -126,8 +126,8 @@ fn every_verdict_has_a_sign_a_pattern_and_its_reason() {
     let mut page = browser.open_url(&server.url, Look::DESK);
     page.until("!!live.state.whole && document.getElementById('next') !== null");
     let mut looks = Vec::new();
-    for (record, kind) in (1..).zip(Kind::ALL) {
-        let (name, kept) = (kind.name(), kind == Kind::Good);
+    for (record, kind) in (1..).zip(Verdict::ALL) {
+        let (name, kept) = (kind.name(), kind == Verdict::Good);
         let say = format!("something <b>odd</b> about record {record}");
         page.eval(&format!(
             "(() => {{ const w = live.state.whole, cell = {{...w.cells[0], attempts: {record}, kept: {}, refused: {{'{name}': 1}}}};
@@ -182,7 +182,7 @@ fn a_stored_verdict_is_on_the_page_at_once() {
     let row = store.record(1).unwrap();
     let samples = store.samples(&row).unwrap();
     let mut slowest = Duration::ZERO;
-    for (n, kind) in (0..).zip(Kind::ALL.into_iter().rev()) {
+    for (n, kind) in (0..).zip(Verdict::ALL.into_iter().rev()) {
         let recording = Recording {
             epoch: 1,
             first_scan: 1_000_000 * u64::from(n),
@@ -193,7 +193,7 @@ fn a_stored_verdict_is_on_the_page_at_once() {
             shot: row.shot,
         };
         let sentence = format!("injected {}", kind.name());
-        let verdict = Verdict { kind, measure: 1.0, limit: 2.0, sentence, peak_n: 50.0, start_s: 0.005 };
+        let verdict = Judgement { kind, measure: 1.0, limit: 2.0, sentence, peak_n: 50.0, start_s: 0.005 };
         let new = NewRecord {
             cell: row.cell,
             attempt: 50 + n,
@@ -205,7 +205,7 @@ fn a_stored_verdict_is_on_the_page_at_once() {
         };
         store.insert(&new, &Counters::default()).unwrap();
         let stored = Instant::now();
-        let (name, good) = (kind.name(), kind == Kind::Good);
+        let (name, good) = (kind.name(), kind == Verdict::Good);
         let seen = format!(
             "live.state.whole.hits.at(-1).sentence === 'injected {name}' && document.getElementById('verdict').hidden === {good}
              && ({good} || document.getElementById('verdict').textContent.includes('{name}: injected'))
@@ -216,7 +216,7 @@ fn a_stored_verdict_is_on_the_page_at_once() {
             std::thread::sleep(Duration::from_millis(4));
         }
         slowest = slowest.max(stored.elapsed());
-        if kind == Kind::DoubleHit {
+        if kind == Verdict::DoubleHit {
             picture(&mut page, "verdict-double-hit");
         }
     }

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use jointrig::campaign::plan::{Cell, DEMO, Plan};
 use jointrig::campaign::verdict::judge::{ByRecord, Judge};
 use jointrig::campaign::verdict::others::Others;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::stream::Recording;
 use jointrig_hil_sim::rig::{self, Measured, Rig, RigConfig};
@@ -80,7 +80,7 @@ fn hit(rig: &mut Rig, map: &ChannelMap, pulse_s: f64) -> Vec<Vec<i16>> {
     channels.iter().map(|channel| channel[from..].to_vec()).collect()
 }
 
-fn judge(plan: &Plan, map: &ChannelMap, channels: &[Vec<i16>]) -> Verdict {
+fn judge(plan: &Plan, map: &ChannelMap, channels: &[Vec<i16>]) -> Judgement {
     let recording = Recording {
         epoch: 0,
         first_scan: 0,
@@ -153,7 +153,7 @@ fn every_rebound_from_two_per_cent_on_is_found_in_simulated_hits() {
                     .collect();
                 let judgement = judge(&plan, &map, &spoilt);
                 cases += 1;
-                if judgement.kind == Kind::DoubleHit {
+                if judgement.kind == Verdict::DoubleHit {
                     found += 1;
                 } else {
                     println!("{fraction} after {after_ms} ms: {judgement:?}");
@@ -174,9 +174,9 @@ fn clean_hits_raise_no_alarm() {
     let refused: Vec<_> = hits
         .iter()
         .map(|channels| judge(&plan, &map, channels))
-        .filter(|judgement| judgement.kind != Kind::Good)
+        .filter(|judgement| judgement.kind != Verdict::Good)
         .collect();
-    let double = refused.iter().filter(|judgement| judgement.kind == Kind::DoubleHit).count();
+    let double = refused.iter().filter(|judgement| judgement.kind == Verdict::DoubleHit).count();
     println!(
         "{double} double hits and {} other refusals among 500 clean hits: {refused:?}",
         refused.len() - double

@@ -9,7 +9,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::level_table::NewLevel;
 use jointrig::campaign::store::record_table::NewRecord;
 use jointrig::campaign::store::session_table::Counters;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::device::stream::Recording;
 use jointrig_tests::campaign::{rows, small_plan};
 use jointrig_tests::command::jointrig;
@@ -77,12 +77,12 @@ fn a_verdict_that_does_not_follow_is_named_although_every_seal_fits() {
         shot: row.shot,
     };
     let next = rows(&store).len() as u32;
-    let verdict = |kind, peak_n| Verdict {
+    let verdict = |kind, peak_n| Judgement {
         peak_n,
-        ..Verdict::without_pulse(kind, row.measure, row.limit, row.sentence.clone())
+        ..Judgement::without_pulse(kind, row.measure, row.limit, row.sentence.clone())
     };
     for (attempt, verdict) in
-        (next..).zip([verdict(Kind::DoubleHit, row.peak_n), verdict(Kind::Good, row.peak_n * 1.001)])
+        (next..).zip([verdict(Verdict::DoubleHit, row.peak_n), verdict(Verdict::Good, row.peak_n * 1.001)])
     {
         let record = NewRecord {
             cell: row.cell,

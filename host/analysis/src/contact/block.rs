@@ -1,6 +1,6 @@
 //! The cells of one impact: rows, frequency lines and the parameters that they depend on.
 
-use super::cell::{self, CHANNELS, ContactCell, Values};
+use super::cell::{self, CHANNELS, CellValues, ContactCell};
 use super::parameters::Cause;
 use super::parameters::{DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
 use super::{ContactError, Input};
@@ -49,7 +49,7 @@ pub struct BlockCell {
 
 /// One row: a channel of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Row {
+pub struct ChannelRow {
     /// Index of the cell in the block.
     pub cell: usize,
     /// T is 0, spot B 1, spot A 2, the point's x, y, z 3 to 5.
@@ -88,7 +88,7 @@ pub struct Block {
     /// The cells.
     pub cells: Vec<BlockCell>,
     /// The rows, one for each channel of each cell.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ChannelRow>,
     /// The lines that are usable in every channel of every cell.
     pub lines: Vec<BlockLine>,
     /// Other blocks and their weights: a shift of the impact by one metre along either of two axes
@@ -250,7 +250,7 @@ fn block(
         .then(|| parameters.add([along_z(impact.name, impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
-    let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<Values>::new());
+    let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<CellValues>::new());
     for (group, cell) in &impact.cells {
         let point = points[&(*group, cell.point)];
         own.extend(point..point + 3);
@@ -266,7 +266,7 @@ fn block(
         own.extend(shift.into_iter().flat_map(|at| at..at + 2));
         let place = cells.len();
         let channels = (0..CHANNELS).filter(|channel| !(alone && *channel == 2));
-        rows.extend(channels.map(|channel| Row { cell: place, channel }));
+        rows.extend(channels.map(|channel| ChannelRow { cell: place, channel }));
         cells.push(BlockCell { group: *group, point, aim: aimed, shift, unexplained: [0.0; 2] });
         lines.push(cell::values(cell, chosen, input.band_hz)?);
     }

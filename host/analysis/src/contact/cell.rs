@@ -58,7 +58,7 @@ const OUTPUT: [usize; CHANNELS] = [5, 4, 3, 0, 1, 2];
 
 /// A cell's values, per newton of the hammer: motion as displacement (m/N), force in N/N.
 #[derive(Debug, Clone)]
-pub(super) struct Values {
+pub(super) struct CellValues {
     /// By line and channel.
     pub value: Vec<[Complex<f64>; CHANNELS]>,
     /// Mean auto-spectrum of the force, by line (N² s²).
@@ -80,7 +80,7 @@ pub(super) fn values(
     cell: &ContactCell<'_>,
     chosen: &[usize],
     band_hz: Band,
-) -> Result<Values, ContactError> {
+) -> Result<CellValues, ContactError> {
     let spectra = cell.spectra;
     if spectra.outputs() != CHANNELS || chosen.iter().any(|l| *l >= spectra.lines()) {
         return Err(ContactError::Unlike { impact: cell.impact.into(), point: cell.point.into() });
@@ -101,7 +101,7 @@ pub(super) fn values(
         inside.iter().map(power).sum::<f64>() / inside.len() as f64
     });
     let line = |&l: &usize| std::array::from_fn(|c| spectra.h1(l, OUTPUT[c]) / spectra.s(l).powi(order[c]));
-    Ok(Values {
+    Ok(CellValues {
         value: chosen.iter().map(line).collect(),
         force: chosen.iter().map(|l| spectra.force(*l)).collect(),
         order,
@@ -114,7 +114,7 @@ pub(super) fn values(
 /// load cells over all cells of an impact, the three axes of the vibrometer within each cell. A
 /// cell with a single hit has no noise estimate, so its point gets the mean noise of the impact's
 /// other points. None if no cell has two hits.
-pub(super) fn pool(cells: &mut [Values]) -> Option<()> {
+pub(super) fn pool(cells: &mut [CellValues]) -> Option<()> {
     for cell in cells.iter_mut() {
         let mean = cell.noise[3..].iter().sum::<f64>() / 3.0;
         cell.noise[3..].fill(mean);
@@ -133,7 +133,7 @@ pub(super) fn pool(cells: &mut [Values]) -> Option<()> {
     Some(())
 }
 
-impl Values {
+impl CellValues {
     /// Standard deviation of a channel's complex noise at a line.
     pub fn sigma(&self, line: usize, channel: usize, s: Complex<f64>) -> f64 {
         let power = self.noise[channel] / (self.force[line] * self.hits as f64);

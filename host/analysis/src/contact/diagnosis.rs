@@ -36,7 +36,7 @@ const APART: f64 = 4.0;
 
 /// The residual of some signals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Left {
+pub struct SignalResidual {
     /// χ² per degree of freedom: 1 where only noise is left.
     pub chi_square: f64,
     /// Rms of the residual relative to the signals' rms, both weighted by the noise.
@@ -88,7 +88,7 @@ impl Signals {
     }
 
     /// The model's residual of these signals in some bins.
-    pub fn left<'a>(self, blocks: &[Block], bins: impl Iterator<Item = &'a Bin>) -> Left {
+    pub fn left<'a>(self, blocks: &[Block], bins: impl Iterator<Item = &'a Bin>) -> SignalResidual {
         let alone = self == Self::Calibration;
         // if the effect of the hammer's aim is only partly known, its errors are not the points'
         // fault: such impacts are left out
@@ -101,14 +101,14 @@ impl Signals {
         let kinds = own.flat_map(|bin| self.kinds().iter().map(move |k| bin.normal.kinds[*k]));
         let [chi, expected, signal] =
             kinds.fold([0.0; 3], |sum: [f64; 3], of| std::array::from_fn(|i| sum[i] + of[i]));
-        Left {
+        SignalResidual {
             chi_square: if expected > 1e-9 { chi / expected } else { 0.0 },
             part: if signal > 0.0 { (chi / signal).sqrt() } else { 0.0 },
         }
     }
 
     /// Whether this residual contradicts the model.
-    pub fn contradict(self, left: Left) -> bool {
+    pub fn contradict(self, left: SignalResidual) -> bool {
         left.chi_square > CONTRADICTED && left.part > self.unexplained()
     }
 }
@@ -126,11 +126,11 @@ pub struct Farthest {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// Residual of the force's form in the hits on B alone.
-    pub calibration: Left,
+    pub calibration: SignalResidual,
     /// Residual of specimen A's points as points of a rigid body.
-    pub specimen_a: Left,
+    pub specimen_a: SignalResidual,
     /// Residual of the spots.
-    pub spots: Left,
+    pub spots: SignalResidual,
     /// χ² per degree of freedom of k_T(f) being a single number.
     pub flatness_chi_square: f64,
     /// The position, angle, gain or delay that deviates most from its stated value; none if nothing

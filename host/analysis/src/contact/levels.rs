@@ -176,7 +176,7 @@ fn along(from: &[[f64; 3]], to: [f64; 3]) -> Option<Vec<f64>> {
 }
 
 /// The compliance at the contact from one replacement of the shaker, with its uncertainties.
-struct Found {
+struct LevelCompliance {
     compliance: C,
     by_parameter: DVector<C>,
     /// E|δ|² of the motions per newton, and of where the shaker pushes.
@@ -188,22 +188,24 @@ struct Found {
 
 /// The mean over the replacements of the shaker, each weighted by its certainty. If they differ by
 /// more than their uncertainties, these are widened.
-fn together(found: &[Found]) -> Found {
-    let certainty = |one: &Found| (one.turning + one.place).max(f64::MIN_POSITIVE).recip();
+fn together(found: &[LevelCompliance]) -> LevelCompliance {
+    let certainty = |one: &LevelCompliance| (one.turning + one.place).max(f64::MIN_POSITIVE).recip();
     let whole: f64 = found.iter().map(certainty).sum();
     let counts: Vec<f64> = found.iter().map(|one| certainty(one) / whole).collect();
-    let mean =
-        |of: &dyn Fn(&Found) -> C| -> C { found.iter().zip(&counts).map(|(one, w)| of(one) * *w).sum() };
+    let mean = |of: &dyn Fn(&LevelCompliance) -> C| -> C {
+        found.iter().zip(&counts).map(|(one, w)| of(one) * *w).sum()
+    };
     let compliance = mean(&|one| one.compliance);
     let apart: f64 = found.iter().map(|one| (one.compliance - compliance).norm_sqr() * certainty(one)).sum();
     let wider = (apart / (found.len().max(2) - 1) as f64).max(1.0);
-    let squares =
-        |of: fn(&Found) -> f64| -> f64 { found.iter().zip(&counts).map(|(one, w)| of(one) * w * w).sum() };
+    let squares = |of: fn(&LevelCompliance) -> f64| -> f64 {
+        found.iter().zip(&counts).map(|(one, w)| of(one) * w * w).sum()
+    };
     let mut by_parameter = DVector::<C>::zeros(found[0].by_parameter.len());
     for (one, w) in found.iter().zip(&counts) {
         by_parameter += &one.by_parameter * C::from(*w);
     }
-    Found {
+    LevelCompliance {
         compliance,
         by_parameter,
         turning: squares(|one| one.turning) * wider,
@@ -235,11 +237,12 @@ fn one(
         .filter_map(|parts| Driven::of(blocks, parts, &known.p, level.frequency_hz, shared))
         .collect();
     let near = !driven.is_empty();
-    let found: Vec<Found> = driven.iter().filter_map(|driven| through(driven, known, level)).collect();
+    let found: Vec<LevelCompliance> =
+        driven.iter().filter_map(|driven| through(driven, known, level)).collect();
     if found.is_empty() {
         return Err(if near { LevelError::NoPlace } else { LevelError::NoLines });
     }
-    let Found { compliance, by_parameter, turning, place, stretches } = together(&found);
+    let LevelCompliance { compliance, by_parameter, turning, place, stretches } = together(&found);
 
     let omega = TAU * level.frequency_hz;
     let stiffness = compliance.inv();
@@ -302,7 +305,7 @@ fn mean_of(stretches: &[[C; 3]]) -> [C; 3] {
 }
 
 /// The level's compliance with these motions per newton, and its derivatives.
-fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Found> {
+fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<LevelCompliance> {
     let s = C::new(0.0, TAU * level.frequency_hz);
     let p = &known.p;
     let tones = mean_of(&level.stretches);
@@ -337,7 +340,7 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Fo
     for (i, value) in &turning.by_parameter {
         by_parameter[*i] += value;
     }
-    Some(Found {
+    Some(LevelCompliance {
         compliance,
         by_parameter,
         turning: turning.noise + turning.bend,

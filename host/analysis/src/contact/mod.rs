@@ -49,7 +49,7 @@ mod solver;
 mod tests;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
-pub use diagnosis::{Diagnosis, Doubt, Farthest, Left};
+pub use diagnosis::{Diagnosis, Doubt, Farthest, SignalResidual};
 pub use joint::{Joint, joint};
 pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};
 pub use outcome::Interval;

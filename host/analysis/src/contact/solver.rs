@@ -50,7 +50,7 @@ pub struct Solution {
 }
 
 /// A point of the search.
-struct Place {
+struct SearchPoint {
     p: Vec<f64>,
     bins: Vec<Bin>,
     cost: f64,
@@ -112,7 +112,7 @@ impl Posterior<'_> {
     /// motion of the next. If a step seems to increase the cost, the current point is therefore
     /// evaluated again with the new motion. Before the noise is widened, outlying cells can prevent
     /// convergence.
-    fn settle(&self, p: Vec<f64>) -> Result<(Place, bool), ContactError> {
+    fn settle(&self, p: Vec<f64>) -> Result<(SearchPoint, bool), ContactError> {
         let mut motion = motions(self.blocks, &evaluate(self.blocks, &p, None)?);
         let mut here = self.place(p, &motion)?;
         motion = motions(self.blocks, &here.bins);
@@ -147,18 +147,18 @@ impl Posterior<'_> {
         Ok((here, false))
     }
 
-    fn place(&self, p: Vec<f64>, motion: &Motion) -> Result<Place, ContactError> {
+    fn place(&self, p: Vec<f64>, motion: &Motion) -> Result<SearchPoint, ContactError> {
         let bins = evaluate(self.blocks, &p, Some(motion))?;
         let own = self.parameters.all().iter().zip(&p);
         let own = own.filter(|(own, _)| own.sigma.is_finite() && own.sigma > 0.0);
         let prior: f64 = own.map(|(own, p)| 0.5 * ((p - own.start) / own.sigma).powi(2)).sum();
         let noise: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
-        Ok(Place { cost: prior + noise / self.shared, p, bins })
+        Ok(SearchPoint { cost: prior + noise / self.shared, p, bins })
     }
 
     /// Half the posterior's curvature, and its gradient. |r|² is minus the log-likelihood of
     /// complex noise; a prior contributes half of (p/σ)².
-    fn normal(&self, at: &Place) -> (DMatrix<f64>, DVector<f64>) {
+    fn normal(&self, at: &SearchPoint) -> (DMatrix<f64>, DVector<f64>) {
         let bins = at.bins.iter().map(|bin| (bin.block, &bin.normal));
         let (mut information, mut gradient) = summed(self.blocks, bins, at.p.len(), self.shared);
         for (i, (own, p)) in self.parameters.all().iter().zip(&at.p).enumerate() {

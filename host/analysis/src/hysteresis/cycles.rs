@@ -34,7 +34,7 @@ const POINTS_FOR_VELOCITY: usize = 64;
 const BLOCK: usize = 64;
 
 /// Which force a cycle holds: the load cells' sum, or the force at the contact.
-pub(super) type Force<'a> = Option<&'a Correction>;
+pub(super) type CycleForce<'a> = Option<&'a Correction>;
 
 /// All whole cycles of a steady record, each resampled to the same number of points, since a period
 /// need not be a whole number of samples.
@@ -119,7 +119,7 @@ struct Sums {
 }
 
 /// One block of cycles, summed for `N` forces.
-struct Block<const N: usize> {
+struct CycleBlock<const N: usize> {
     displacement_m: Vec<f64>,
     motion_means: Vec<f64>,
     velocity_m_per_s: Vec<f64>,
@@ -134,7 +134,7 @@ struct Scratch {
 }
 
 /// Location of a cycle in the record.
-struct Place {
+struct CycleSpan {
     /// Index among the cycles used.
     number: usize,
     /// The samples that it is interpolated from.
@@ -188,7 +188,12 @@ impl<'a> Steady<'a> {
     }
 
     /// Calls `look` for every cycle with this force, in order; `of` is the sum over all of them.
-    pub fn each<T: Send>(&self, force: Force<'_>, of: &Summed, look: impl Fn(&Cycle) -> T + Sync) -> Vec<T> {
+    pub fn each<T: Send>(
+        &self,
+        force: CycleForce<'_>,
+        of: &Summed,
+        look: impl Fn(&Cycle) -> T + Sync,
+    ) -> Vec<T> {
         let blocks: Vec<Vec<T>> = self.blocks(|cycles| {
             let mut scratch = Scratch::default();
             cycles
@@ -206,7 +211,7 @@ impl<'a> Steady<'a> {
     /// Results over all cycles for each of these forces; the motion is cut only once for all of
     /// them. If displacement or force drifts, the cycles are cut a second time with the drift
     /// removed.
-    pub fn summed<const N: usize>(&self, forces: [Force<'_>; N]) -> [Summed; N] {
+    pub fn summed<const N: usize>(&self, forces: [CycleForce<'_>; N]) -> [Summed; N] {
         let (summed, drifts) = self.summed_without(forces, &std::array::from_fn(|_| Drifts::default()));
         if drifts.iter().all(|drift| drift.motion.is_empty() && drift.force.is_empty()) {
             return summed;
@@ -220,7 +225,7 @@ impl<'a> Steady<'a> {
     /// The same with these drifts removed, and the drifts found in the means of the cycles.
     fn summed_without<const N: usize>(
         &self,
-        forces: [Force<'_>; N],
+        forces: [CycleForce<'_>; N],
         without: &[Drifts; N],
     ) -> ([Summed; N], [Drifts; N]) {
         let wheels = Wheels::new(self.points);
@@ -285,12 +290,12 @@ impl<'a> Steady<'a> {
     fn sum<const N: usize>(
         &self,
         cycles: Range<usize>,
-        forces: &[Force<'_>; N],
+        forces: &[CycleForce<'_>; N],
         without: &[Drifts; N],
         wheels: &Wheels,
-    ) -> Block<N> {
+    ) -> CycleBlock<N> {
         let mut scratch = Scratch::default();
-        let mut block = Block {
+        let mut block = CycleBlock {
             displacement_m: vec![0.0; self.points],
             motion_means: Vec::new(),
             velocity_m_per_s: vec![0.0; self.points],
@@ -323,12 +328,12 @@ impl<'a> Steady<'a> {
     }
 
     /// Location of cycle number `cycle`.
-    fn place(&self, cycle: usize) -> Place {
+    fn place(&self, cycle: usize) -> CycleSpan {
         let [begin_s, end_s] = [0.0, 1.0].map(|more| self.timing.begin_s(cycle as f64 + more));
         let (begin, period) = (begin_s * self.record.fs_hz, (end_s - begin_s) * self.record.fs_hz);
         // cubic interpolation needs one sample before and two after
         let first = begin.floor() as isize - 1;
-        Place {
+        CycleSpan {
             number: cycle - self.used.start,
             samples: first..(begin + period).floor() as isize + 3,
             from: begin - first as f64,
@@ -339,7 +344,7 @@ impl<'a> Steady<'a> {
 
     /// Cuts displacement and velocity of a cycle and removes the drift; returns the mean of the
     /// measured signal.
-    fn cut_motion(&self, place: &Place, drift: &[f64], scratch: &mut Scratch) -> f64 {
+    fn cut_motion(&self, place: &CycleSpan, drift: &[f64], scratch: &mut Scratch) -> f64 {
         let Scratch { cycle: cut, samples } = scratch;
         self.record.relative_motion(place.samples.clone(), samples);
         resample(samples, place, self.points, &mut cut.velocity_m_per_s);
@@ -364,7 +369,13 @@ impl<'a> Steady<'a> {
     }
 
     /// Cuts the force and removes the drift; returns its mean.
-    fn cut_force(&self, place: &Place, force: Force<'_>, drift: &[f64], scratch: &mut Scratch) -> f64 {
+    fn cut_force(
+        &self,
+        place: &CycleSpan,
+        force: CycleForce<'_>,
+        drift: &[f64],
+        scratch: &mut Scratch,
+    ) -> f64 {
         let Scratch { cycle: cut, samples } = scratch;
         match force {
             None => self.record.force(place.samples.clone(), samples),
@@ -450,7 +461,7 @@ fn levelled(x: &mut [f64], drift: Option<&f64>) -> f64 {
 /// A step differs from one sample by a small fraction only, so the position between two samples
 /// changes slowly. Points are processed in runs of equal whole steps; a run ends only where the
 /// position passes a sample.
-fn resample(x: &[f64], &Place { from, step, .. }: &Place, points: usize, to: &mut Vec<f64>) {
+fn resample(x: &[f64], &CycleSpan { from, step, .. }: &CycleSpan, points: usize, to: &mut Vec<f64>) {
     let drift = step - 1.0;
     to.clear();
     to.resize(points, 0.0);
@@ -594,7 +605,7 @@ mod tests {
         let parabola = |at: f64| 3.0 - 2.0 * at + 0.25 * at * at;
         let x: Vec<f64> = (0..64).map(|i| parabola(f64::from(i))).collect();
         for (from, step) in [(1.0, 1.0), (1.3, 1.0), (1.0, 0.98), (1.02, 0.97), (1.99, 1.03), (1.5, 1.01)] {
-            let place = Place { number: 0, samples: 0..64, from, step, dt_s: 1.0 };
+            let place = CycleSpan { number: 0, samples: 0..64, from, step, dt_s: 1.0 };
             let mut found = Vec::new();
             resample(&x, &place, 58, &mut found);
             for (j, found) in found.iter().enumerate() {

@@ -136,12 +136,12 @@ impl HammerSlip {
         let mut names: Vec<&str> = cells.iter().map(|c| c.impact).collect();
         names.sort_unstable();
         names.dedup();
-        let impacts: Vec<Impact> = names
+        let impacts: Vec<SlipImpact> = names
             .into_iter()
-            .map(|name| Impact::of(cells.iter().filter(|c| c.impact == name)))
+            .map(|name| SlipImpact::of(cells.iter().filter(|c| c.impact == name)))
             .filter(|impact| impact.freedom() >= FEWEST_OF_IMPACT)
             .collect();
-        let differences: usize = impacts.iter().map(Impact::freedom).sum();
+        let differences: usize = impacts.iter().map(SlipImpact::freedom).sum();
         if differences < FEWEST {
             return Self::CannotTell(Unclear::TooFewHits { differences, needed: FEWEST });
         }
@@ -161,7 +161,7 @@ impl HammerSlip {
             force_scatter,
             peak_tangential_n: impacts.iter().map(|i| i.peak_tangential_n).sum::<f64>() / hits as f64,
         };
-        let largest = impacts.iter().map(Impact::largest_of_tangential).fold(0.0, f64::max);
+        let largest = impacts.iter().map(SlipImpact::largest_of_tangential).fold(0.0, f64::max);
         if chance < NO_ACCIDENT && largest > LEFT_BEHIND {
             Self::Slips(Scaling { change_per_force: change_per_force.max(largest), ..scaling })
         } else if std < TOO_COARSE && (change_per_force < MUCH || chance > BY_CHANCE) {
@@ -193,7 +193,7 @@ fn chance<'a>(slopes: impl Iterator<Item = (&'a Slope, usize)>) -> f64 {
 
 /// d ln(T/F) / d ln F over all impacts in the band where it is best known, and the standard
 /// deviation of its parts.
-fn tangential(impacts: &[Impact]) -> (f64, f64) {
+fn tangential(impacts: &[SlipImpact]) -> (f64, f64) {
     let of_band = |band: usize| {
         let (mut sum, mut weights) = (Complex::default(), 0.0);
         for impact in impacts {
@@ -210,7 +210,7 @@ fn tangential(impacts: &[Impact]) -> (f64, f64) {
 }
 
 /// All cells of one impact.
-struct Impact {
+struct SlipImpact {
     /// First T in each band, then v_A, v_B and v_A − v_B.
     features: Vec<Slope>,
     /// Hits.
@@ -239,7 +239,7 @@ impl Slope {
     }
 }
 
-impl Impact {
+impl SlipImpact {
     fn of<'a>(cells: impl Iterator<Item = &'a CellHits<'a>>) -> Self {
         let cells: Vec<Vec<&HitResponse>> =
             cells.map(|cell| alike(&cell.hits)).filter(|own| own.len() > 1).collect();

@@ -215,14 +215,14 @@ pub(super) struct LawFit {
 }
 
 /// Least squares with non-negative weights, except for the last column.
-struct Problem {
+struct LeastSquares {
     columns: DMatrix<f64>,
     gram: DMatrix<f64>,
     /// Divisors that normalised the columns to unit length.
     scale: Vec<f64>,
 }
 
-impl Problem {
+impl LeastSquares {
     fn new(cycle: &Cycle, reaches: &[f64], play_m: f64) -> Self {
         let points = cycle.displacement_m.len();
         let mut columns = DMatrix::zeros(points, reaches.len() + 2);
@@ -344,7 +344,7 @@ impl LawFit {
         if half.is_nan() || half <= 0.0 {
             return None;
         }
-        let problem = Problem::new(cycle, &spread(0.01 * half, half, COARSE), play_m);
+        let problem = LeastSquares::new(cycle, &spread(0.01 * half, half, COARSE), play_m);
         let period_s = dt_s * cycle.force_n.len() as f64;
         let step_s = period_s / AROUND as f64;
         let left = |late_s: f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), true).1;
@@ -365,7 +365,7 @@ impl LawFit {
         }
         let step_s = (range_s[1] - range_s[0]) / (STEPS - 1) as f64;
         let mut reaches = spread(0.01 * half, half, COARSE);
-        let coarse = Problem::new(cycle, &reaches, play_m);
+        let coarse = LeastSquares::new(cycle, &reaches, play_m);
         let (weights, _) = coarse.solved(&shifted(&cycle.force_n, first_s / dt_s), true);
         let most = centre(&coarse, &weights, &reaches)?;
         reaches.extend(spread(0.7 * most, 1.4 * most, FINE));
@@ -373,13 +373,13 @@ impl LawFit {
         // the last pass: otherwise a corner between two reaches would look like a delay
         let mut late = 0.0;
         for width in CLOSER {
-            let problem = Problem::new(cycle, &reaches, play_m);
+            let problem = LeastSquares::new(cycle, &reaches, play_m);
             late = earliest(&problem, cycle, dt_s, true, range_s);
             let (weights, _) = problem.solved(&shifted(&cycle.force_n, late / dt_s), true);
             let about = centre(&problem, &weights, &reaches)?;
             reaches.extend(spread(about * (1.0 - width), about * (1.0 + width), FINER));
         }
-        let problem = Problem::new(cycle, &reaches, play_m);
+        let problem = LeastSquares::new(cycle, &reaches, play_m);
         let free = reaches.len() + 1;
         let at = |late_s: f64, dashpot: bool| {
             let (weights, left) = problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot);
@@ -423,7 +423,7 @@ fn spread(from: f64, to: f64, count: usize) -> Vec<f64> {
 }
 
 /// Reach of the element that carries most, averaged with its neighbours.
-fn centre(problem: &Problem, weights: &DVector<f64>, reaches: &[f64]) -> Option<f64> {
+fn centre(problem: &LeastSquares, weights: &DVector<f64>, reaches: &[f64]) -> Option<f64> {
     let carries = |j: usize| {
         if problem.scale[j] > 0.0 { weights[j] / problem.scale[j] * reaches[j] } else { 0.0 }
     };
@@ -436,7 +436,7 @@ fn centre(problem: &Problem, weights: &DVector<f64>, reaches: &[f64]) -> Option<
 }
 
 /// The delay (s) within a range that leaves the smallest sum of squares.
-fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, [from, to]: [f64; 2]) -> f64 {
+fn earliest(problem: &LeastSquares, cycle: &Cycle, dt_s: f64, dashpot: bool, [from, to]: [f64; 2]) -> f64 {
     let step = (to - from) / (STEPS - 1) as f64;
     let left = |late_s: &f64| problem.solved(&shifted(&cycle.force_n, late_s / dt_s), dashpot).1;
     let all: Vec<(f64, f64)> =
@@ -448,7 +448,7 @@ fn earliest(problem: &Problem, cycle: &Cycle, dt_s: f64, dashpot: bool, [from, t
 /// The same near `centre`, by successive parabolas through three delays that are `width` apart,
 /// with decreasing width.
 fn closest(
-    problem: &Problem,
+    problem: &LeastSquares,
     cycle: &Cycle,
     dt_s: f64,
     dashpot: bool,

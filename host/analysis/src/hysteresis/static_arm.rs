@@ -38,7 +38,7 @@ const SPREAD: f64 = 1.5;
 /// Source of the correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Basis {
+pub enum CorrectionSource {
     /// Stated by the user or the plan.
     Given,
     /// Fitted to hits on B alone.
@@ -54,7 +54,7 @@ pub struct Identified {
     #[serde(flatten)]
     pub correction: Correction,
     /// Source of the values.
-    pub basis: Basis,
+    pub basis: CorrectionSource,
     /// Relative rms residual of the force after the fit; 0 if the values were given.
     pub residual: f64,
 }
@@ -78,7 +78,7 @@ pub fn from_known_force(
         None => least_squares(real.iter().map(|(t, a)| ([*t, *a], 1.0)))?,
     };
     let squares: f64 = real.iter().map(|(t, a)| (factor * t + mass * a - 1.0).powi(2)).sum();
-    accepted(factor - 1.0, mass, (squares / n).sqrt(), Basis::Hits)
+    accepted(factor - 1.0, mass, (squares / n).sqrt(), CorrectionSource::Hits)
 }
 
 /// From stuck levels; `None` with too few frequencies, or if no common stiffness explains them.
@@ -101,10 +101,15 @@ pub fn from_levels(levels: &[Tones], parallel_path: f64) -> Option<Identified> {
     let (stiffness, slope) = least_squares(points.iter().map(|(x, y)| ([1.0, *x], *y)))?;
     let squares: f64 = points.iter().map(|(x, y)| (stiffness + slope * x - y).powi(2)).sum();
     let residual = (squares / points.len() as f64).sqrt() / stiffness.abs();
-    accepted(parallel_path, slope * (1.0 + parallel_path), residual, Basis::Levels)
+    accepted(parallel_path, slope * (1.0 + parallel_path), residual, CorrectionSource::Levels)
 }
 
-fn accepted(parallel_path: f64, effective_mass_kg: f64, residual: f64, basis: Basis) -> Option<Identified> {
+fn accepted(
+    parallel_path: f64,
+    effective_mass_kg: f64,
+    residual: f64,
+    basis: CorrectionSource,
+) -> Option<Identified> {
     (effective_mass_kg > 0.0 && residual < WORST_RESIDUAL && parallel_path > -0.1).then_some(Identified {
         correction: Correction { effective_mass_kg, parallel_path },
         basis,

@@ -4,7 +4,7 @@ use super::HysteresisError;
 use super::analyse::{Kind, LoopAnalysis};
 use super::cycles::Cycle;
 use super::cycles::Harmonics;
-use super::cycles::{Force, Steady, Summed};
+use super::cycles::{CycleForce, Steady, Summed};
 use super::finding::LoopFinding;
 use super::hum;
 use super::loops::{
@@ -15,7 +15,7 @@ use super::repair::{Delay, Repair, delay};
 use super::shape::Quadratures;
 use super::shape::{Shape, ShapeEvidence, shape};
 use super::stick::{
-    BEFORE_PLAY, Part, bends, first_part, flank_part, friction_limit, slope_over, strokes,
+    BEFORE_PLAY, SwingPart, bends, first_part, flank_part, friction_limit, slope_over, strokes,
     tangent_at_reversal,
 };
 use super::stick::{Plateaus, Play};
@@ -192,7 +192,7 @@ fn late_at_least(quadratures: &Quadratures, frequency_hz: f64) -> Option<LoopFin
 /// No whole cycle, or nothing moves.
 pub(super) fn shaker<const N: usize>(
     record: &HysteresisRecord,
-    forces: [Force<'_>; N],
+    forces: [CycleForce<'_>; N],
     frequency_hz: f64,
 ) -> Result<[LoopAnalysis; N], HysteresisError> {
     let (timing, off) = timing(record, frequency_hz)?;
@@ -228,7 +228,7 @@ struct SteadyRecord<'a> {
 }
 
 impl SteadyRecord<'_> {
-    fn loops(&self, force: Force<'_>, summed: &Summed) -> LoopAnalysis {
+    fn loops(&self, force: CycleForce<'_>, summed: &Summed) -> LoopAnalysis {
         let Self { record, cycles, frequency_hz, said } = self;
         let (frequency_hz, dt_s) = (*frequency_hz, cycles.dt_s());
         let mut findings = said.clone();
@@ -299,7 +299,7 @@ impl SteadyRecord<'_> {
         }
         let k_eq = OverCycles::of(&slopes).expect("as many as there are cycles");
         let friction = repair.friction(mean);
-        let stick_part: Option<Part> = match shape {
+        let stick_part: Option<SwingPart> = match shape {
             Shape::Stuck | Shape::Elliptical => None,
             Shape::Microslip => Some(first_part(&friction, &strokes)),
             Shape::GrossSlip if play.is_some() => Some(BEFORE_PLAY),

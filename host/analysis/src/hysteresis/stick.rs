@@ -22,17 +22,17 @@ use super::cycles::Cycle;
 use super::loops::{slope, swing};
 
 /// A part of the force's swing after a reversal, from the first to the second fraction.
-pub(super) type Part = [f64; 2];
+pub(super) type SwingPart = [f64; 2];
 
 /// Part used of a straight flank up to a plateau.
-const FLANK: Part = [0.10, 0.90];
+const FLANK: SwingPart = [0.10, 0.90];
 
 /// Its halves, used to check that it is straight.
-const HALVES: [Part; 2] = [[0.10, 0.50], [0.50, 0.90]];
+const HALVES: [SwingPart; 2] = [[0.10, 0.50], [0.50, 0.90]];
 
 /// Part used of a flank with play: the play occurs where the force is zero, half the swing after
 /// the reversal.
-pub(super) const BEFORE_PLAY: Part = [0.10, 0.40];
+pub(super) const BEFORE_PLAY: SwingPart = [0.10, 0.40];
 
 /// A flank counts as straight if the slope of its later half is at least this fraction of that of
 /// the earlier half: ringing alone leaves 0.95 or more, whereas the halves of an Iwan contact
@@ -40,11 +40,11 @@ pub(super) const BEFORE_PLAY: Part = [0.10, 0.40];
 const STRAIGHT_FLANK: f64 = 0.9;
 
 /// Part used of a straight contact without a plateau.
-const LATE: Part = [0.20, 0.40];
+const LATE: SwingPart = [0.20, 0.40];
 
 /// Part used of a bending one. The first samples after a reversal are excluded: they hardly move,
 /// and their displacement is noise of the integration.
-const EARLY: Part = [0.02, 0.20];
+const EARLY: SwingPart = [0.02, 0.20];
 
 /// The flank counts as straight if the later part has at least this fraction of the earlier one's
 /// slope.
@@ -85,7 +85,7 @@ fn progress(cycle: &Cycle, stroke: &Stroke) -> Vec<f64> {
 }
 
 /// The part to use for a contact without a plateau, chosen from the averaged loop.
-pub(super) fn first_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
+pub(super) fn first_part(guide: &Cycle, strokes: &[Stroke; 2]) -> SwingPart {
     match (slope_over(guide, strokes, EARLY), slope_over(guide, strokes, LATE)) {
         (Some(early), Some(late)) if late < STRAIGHT * early => EARLY,
         (_, Some(_)) => LATE,
@@ -94,7 +94,7 @@ pub(super) fn first_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
 }
 
 /// The part to use for a contact with a plateau, chosen from the averaged loop.
-pub(super) fn flank_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
+pub(super) fn flank_part(guide: &Cycle, strokes: &[Stroke; 2]) -> SwingPart {
     match HALVES.map(|half| slope_over(guide, strokes, half)) {
         [Some(early), Some(late)] if late < STRAIGHT_FLANK * early => EARLY,
         _ => FLANK,
@@ -103,7 +103,7 @@ pub(super) fn flank_part(guide: &Cycle, strokes: &[Stroke; 2]) -> Part {
 
 /// k_T: pooled least-squares slope of T on Δx over this part of both strokes, N/m. `None` with too
 /// few samples in it.
-pub(super) fn slope_over(cycle: &Cycle, strokes: &[Stroke; 2], [start, end]: Part) -> Option<f64> {
+pub(super) fn slope_over(cycle: &Cycle, strokes: &[Stroke; 2], [start, end]: SwingPart) -> Option<f64> {
     let (mut xs, mut ts) = (Vec::new(), Vec::new());
     for stroke in strokes {
         let (mut x, mut t): (Vec<f64>, Vec<f64>) = stroke
@@ -144,7 +144,7 @@ pub(super) fn tangent_at_reversal(cycle: &Cycle, strokes: &[Stroke; 2]) -> Optio
 }
 
 /// Whether this is the part used for a bending flank.
-pub(super) fn bends(part: Part) -> bool {
+pub(super) fn bends(part: SwingPart) -> bool {
     part == EARLY
 }
 

@@ -60,14 +60,14 @@ impl Output {
 }
 
 /// The sums to which the lines of a hit are added, and its force at every line.
-struct Sums<'a> {
+struct HitSums<'a> {
     all: &'a Order,
     band: &'a Order,
     output: &'a mut Output,
     force: &'a [Complex<f64>],
 }
 
-impl Lines for Sums<'_> {
+impl Lines for HitSums<'_> {
     #[inline]
     fn take(&mut self, stretch: usize, within: Range<usize>, values: impl Iterator<Item = Complex<f64>>) {
         let place = self.band.places(stretch, &within);
@@ -214,12 +214,12 @@ impl SpectraAverage {
                 for (hit, force) in hits.clone().zip(&forces) {
                     let record = response(hit, o);
                     if !keep {
-                        transform.transform(record, band, &mut Sums { all, band, output, force })?;
+                        transform.transform(record, band, &mut HitSums { all, band, output, force })?;
                         continue;
                     }
                     let mut own = vec![Complex::default(); band.len()];
                     transform.transform(record, band, &mut Put { order: band, out: &mut own })?;
-                    let mut sums = Sums { all, band, output, force };
+                    let mut sums = HitSums { all, band, output, force };
                     for stretch in 0..band.stretches().len() {
                         let within = band.within(stretch);
                         let own = &own[band.places(stretch, &within)];

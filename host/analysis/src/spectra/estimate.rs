@@ -127,7 +127,7 @@ impl Summing {
 }
 
 /// A hit that is included in the average.
-struct Hit<'r> {
+struct AveragedHit<'r> {
     force: &'r [f64],
     responses: &'r [Vec<f64>],
     origin_s: f64,
@@ -188,16 +188,16 @@ pub(super) fn summed(
         };
         let pulse = found.map_or_else(PulseSamples::none, |pulse| PulseSamples::of(&pulse, force));
         let weighting = window.of_response(&decay, origin_s);
-        hits.push(Hit { force, responses, origin_s, pulse, weighting });
+        hits.push(AveragedHit { force, responses, origin_s, pulse, weighting });
     }
     average.add_hits(
         hits.len(),
         &|hit, out| {
-            let Hit { force, origin_s, pulse, .. } = &hits[hit];
+            let AveragedHit { force, origin_s, pulse, .. } = &hits[hit];
             window.force_into(force, &decay, *origin_s, pulse, out);
         },
         &|hit, o| {
-            let Hit { responses, weighting, .. } = &hits[hit];
+            let AveragedHit { responses, weighting, .. } = &hits[hit];
             Windowed::response(&responses[o], weighting)
         },
     )?;

@@ -4,10 +4,10 @@
 use super::decoupling::{InverseBlock, PrimalBlock};
 use super::interface_data::{balance, scaled};
 use super::internal_dofs::Rearrangement;
-use super::lanes::{Cell, Matrix, Pool, Sure, inverse, lines, minus, plus, product, times, to_left_of};
+use super::lanes::{LaneCell, Matrix, Pool, Sure, inverse, lines, minus, plus, product, times, to_left_of};
 use super::reduced::{Reduced, RefusedReason};
 use super::rooms::{Rooms, Side};
-use super::solve::{Refusal, Work};
+use super::solve::{LineRefusal, Work};
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix};
@@ -17,7 +17,7 @@ use std::cell::OnceCell;
 type Line = DMatrix<Complex<f64>>;
 
 /// Results of all lines.
-pub(super) struct Found {
+pub(super) struct LineResults {
     /// Y^A and Y^B, rotations in metres; empty if not requested.
     pub(super) alone: Vec<Vec<Line>>,
     /// Z^J of each work item.
@@ -38,7 +38,7 @@ impl Job<'_> {
     ///
     /// # Errors
     /// Y^A or Y^B contains a value that is not finite.
-    pub(super) fn found(&self) -> Result<Found, RefusedReason> {
+    pub(super) fn found(&self) -> Result<LineResults, RefusedReason> {
         let lines = self.rooms.a.frf.lines().len();
         let places = |count| vec![vec![Line::zeros(0, 0); lines]; count];
         let (mut alone, mut z) = (places(if self.alone { 2 } else { 0 }), places(self.works.len()));
@@ -56,7 +56,7 @@ impl Job<'_> {
                 *z = Err(refusal.reason.clone());
             }
         }
-        Ok(Found { alone, z })
+        Ok(LineResults { alone, z })
     }
 }
 
@@ -64,7 +64,7 @@ impl Job<'_> {
 #[derive(Default)]
 pub(super) struct RefusedLines {
     alone: [Vec<usize>; 2],
-    z: Vec<(usize, Refusal)>,
+    z: Vec<(usize, LineRefusal)>,
 }
 
 /// Destination of the results.
@@ -166,7 +166,7 @@ impl<'a, S: Simd> AtOnce<'a, S> {
         }
         let d = balance(reduced.idms);
         let order = rooms.a.frf.quantity().order_of_s();
-        let mut factor = Cell::all(self.pool.simd, 1.0);
+        let mut factor = LaneCell::all(self.pool.simd, 1.0);
         for lane in 0..self.count {
             let Complex { re, im } = rooms.a.frf.s(self.first + lane).powi(order);
             (factor.re.each_mut()[lane], factor.im.each_mut()[lane]) = (re, im);

@@ -197,7 +197,7 @@ fn apart(one: &BetweenArms, other: &BetweenArms) -> f64 {
 mod tests {
     use super::*;
     use crate::substructuring::averaged::{DofEstimate, Priors};
-    use crate::substructuring::fit::{FittedDof, Shape};
+    use crate::substructuring::fit::{FittedDof, FreeEntries};
     use std::collections::BTreeMap;
 
     const BAND: crate::band::Band = crate::band::Band { low_hz: 300.0, high_hz: 600.0 };
@@ -219,7 +219,7 @@ mod tests {
             idms: 6,
             priors: Priors::default(),
             mounting: 0.005,
-            shape: Shape::Diagonal,
+            shape: FreeEntries::Diagonal,
             joint: BTreeMap::from([(Dof::Z, z)]),
             coupling_si: BTreeMap::new(),
             chi_square_per_dof: chi_square,

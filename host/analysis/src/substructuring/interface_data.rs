@@ -82,7 +82,7 @@ pub(crate) fn found(
 }
 
 /// A virtual point in one file: its rows and columns, and both transformations.
-pub(crate) struct VirtualPoint {
+pub(crate) struct LocatedVirtualPoint {
     pub(crate) rows: Found,
     pub(crate) columns: Found,
     pub(crate) responses: Transformation,
@@ -111,7 +111,7 @@ impl Measured<'_> {
         grouping: Grouping,
         geometry: &Geometry,
         idms: IdmSet,
-    ) -> Result<VirtualPoint, InterfaceError> {
+    ) -> Result<LocatedVirtualPoint, InterfaceError> {
         let (substructure, origin) = match grouping {
             Grouping::InterfaceA | Grouping::InternalA | Grouping::SpecimenA => {
                 (Structure::A, geometry.virtual_point_a_m)
@@ -143,7 +143,7 @@ impl Measured<'_> {
         }
         let responses = vpt::responses(&rows.points, origin, idms, None).map_err(fail)?;
         let impacts = vpt::impacts(&columns.points, origin, idms, None).map_err(fail)?;
-        Ok(VirtualPoint { rows, columns, responses, impacts })
+        Ok(LocatedVirtualPoint { rows, columns, responses, impacts })
     }
 
     /// The given block of every line; refuses values that are not finite.

@@ -15,7 +15,7 @@ where
     assert_eq!(a.ncols(), b.nrows(), "A has as many columns as B has rows");
     let mut out = DMatrix::zeros(a.nrows(), b.ncols());
     let (columns, factors) = (a.as_slice(), b.as_slice());
-    wide(Sums { out: out.as_mut_slice(), rows: a.nrows(), columns, factors, inner: b.nrows() });
+    wide(ProductSums { out: out.as_mut_slice(), rows: a.nrows(), columns, factors, inner: b.nrows() });
     out
 }
 
@@ -32,7 +32,7 @@ pub(crate) fn product_of_block(
     for column in columns.iter().map(|&c| &y.as_slice()[c * y.nrows()..][..y.nrows()]) {
         factors.extend(rows.iter().map(|&r| column[r]));
     }
-    wide(Sums {
+    wide(ProductSums {
         out: out.as_mut_slice(),
         rows: t.nrows(),
         columns: t.as_slice(),
@@ -43,7 +43,7 @@ pub(crate) fn product_of_block(
 }
 
 /// out + A B, all column-major.
-struct Sums<'a, A, B> {
+struct ProductSums<'a, A, B> {
     out: &'a mut [Complex<f64>],
     rows: usize,
     columns: &'a [A],
@@ -51,7 +51,7 @@ struct Sums<'a, A, B> {
     inner: usize,
 }
 
-impl<A, B> NullaryFnOnce for Sums<'_, A, B>
+impl<A, B> NullaryFnOnce for ProductSums<'_, A, B>
 where
     A: Copy + Mul<B, Output = Complex<f64>>,
     B: Copy,
@@ -68,7 +68,7 @@ where
     }
 }
 
-impl<A, B> Sums<'_, A, B>
+impl<A, B> ProductSums<'_, A, B>
 where
     A: Copy + Mul<B, Output = Complex<f64>>,
     B: Copy,

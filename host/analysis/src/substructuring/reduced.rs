@@ -38,7 +38,7 @@ pub enum RefusedReason {
 }
 
 /// The kind of computation behind a method.
-pub(super) enum Kind {
+pub(super) enum MethodKind {
     /// Responses on the first side, hits on the second.
     Internal(Side, Side, Which),
     Interface,
@@ -46,19 +46,19 @@ pub(super) enum Kind {
     Inverse(InverseBlock),
 }
 
-impl From<Method> for Kind {
-    fn from(method: Method) -> Kind {
+impl From<Method> for MethodKind {
+    fn from(method: Method) -> MethodKind {
         match method {
-            Method::Internal => Kind::Internal(Side::B, Side::A, Which::All),
-            Method::InternalPrinted => Kind::Internal(Side::B, Side::A, Which::Printed),
-            Method::InternalAa => Kind::Internal(Side::A, Side::A, Which::All),
-            Method::InternalAb => Kind::Internal(Side::A, Side::B, Which::All),
-            Method::InternalBb => Kind::Internal(Side::B, Side::B, Which::All),
-            Method::Interface => Kind::Interface,
-            Method::PrimalA => Kind::Primal(PrimalBlock::A),
-            Method::PrimalB => Kind::Primal(PrimalBlock::B),
-            Method::Inverse => Kind::Inverse(InverseBlock::Ab),
-            Method::InverseBa => Kind::Inverse(InverseBlock::Ba),
+            Method::Internal => MethodKind::Internal(Side::B, Side::A, Which::All),
+            Method::InternalPrinted => MethodKind::Internal(Side::B, Side::A, Which::Printed),
+            Method::InternalAa => MethodKind::Internal(Side::A, Side::A, Which::All),
+            Method::InternalAb => MethodKind::Internal(Side::A, Side::B, Which::All),
+            Method::InternalBb => MethodKind::Internal(Side::B, Side::B, Which::All),
+            Method::Interface => MethodKind::Interface,
+            Method::PrimalA => MethodKind::Primal(PrimalBlock::A),
+            Method::PrimalB => MethodKind::Primal(PrimalBlock::B),
+            Method::Inverse => MethodKind::Inverse(InverseBlock::Ab),
+            Method::InverseBa => MethodKind::Inverse(InverseBlock::Ba),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::geometry::{Geometry, Grouping};
 use super::idm::IdmSet;
-use super::interface_data::{InterfaceError, Measured, VirtualPoint, balance};
+use super::interface_data::{InterfaceError, LocatedVirtualPoint, Measured, balance};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -36,7 +36,7 @@ impl<'a> Rooms<'a> {
 /// A virtual point in one file with its rotations in metres: T_u and T_f between measured points
 /// and D u, D⁻¹ f.
 pub(super) struct Balanced {
-    pub(super) vp: VirtualPoint,
+    pub(super) vp: LocatedVirtualPoint,
     pub(super) t_u: DMatrix<f64>,
     pub(super) t_f: DMatrix<f64>,
 }

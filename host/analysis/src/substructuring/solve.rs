@@ -2,14 +2,14 @@
 //!
 //! Z^J of one separate line by one method, for lines near rank loss or with a refusal.
 
-use super::at_once::{Found, Job};
+use super::at_once::{Job, LineResults};
 use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
 use super::internal_dofs::Rearrangement;
 use super::method::Method;
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
-use super::reduced::{Kind, Reduced, RefusedReason};
+use super::reduced::{MethodKind, Reduced, RefusedReason};
 use super::rooms::{Rooms, Side};
 use nalgebra::{Complex, DMatrix};
 
@@ -31,7 +31,7 @@ pub(super) struct Solutions {
 }
 
 /// A method with notes for the user.
-struct Plan<'a> {
+struct MethodPlan<'a> {
     work: Work<'a>,
     notes: Vec<String>,
     internals: Option<Internals>,
@@ -48,15 +48,15 @@ impl Reduced {
         methods: &[Method],
         alone: bool,
     ) -> Result<Solutions, RefusedReason> {
-        let plans: Vec<Result<Plan<'_>, RefusedReason>> =
+        let plans: Vec<Result<MethodPlan<'_>, RefusedReason>> =
             methods.iter().map(|&method| self.plan(rooms, method)).collect();
         let works = plans.iter().flatten().map(|plan| &plan.work).collect();
-        let Found { alone, z } = Job { reduced: self, rooms, works, alone }.found()?;
+        let LineResults { alone, z } = Job { reduced: self, rooms, works, alone }.found()?;
         let mut z = z.into_iter();
         let by_method = plans
             .into_iter()
             .map(|plan| {
-                let Plan { notes, internals, .. } = plan?;
+                let MethodPlan { notes, internals, .. } = plan?;
                 let z = z.next().unwrap_or_else(|| Ok(Vec::new()))?;
                 Ok(Solution { z, notes, internals })
             })
@@ -64,18 +64,18 @@ impl Reduced {
         Ok(Solutions { alone, by_method })
     }
 
-    fn plan<'a>(&'a self, rooms: &'a Rooms<'a>, method: Method) -> Result<Plan<'a>, RefusedReason> {
-        let work = match Kind::from(method) {
-            Kind::Internal(seen, hit, which) => {
+    fn plan<'a>(&'a self, rooms: &'a Rooms<'a>, method: Method) -> Result<MethodPlan<'a>, RefusedReason> {
+        let work = match MethodKind::from(method) {
+            MethodKind::Internal(seen, hit, which) => {
                 let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
                 return self.with_internals(rooms, method, internals);
             }
-            Kind::Interface => Work::Interface,
-            Kind::Primal(block) => Work::Primal(block),
-            Kind::Inverse(block) => Work::Inverse(block),
+            MethodKind::Interface => Work::Interface,
+            MethodKind::Primal(block) => Work::Primal(block),
+            MethodKind::Inverse(block) => Work::Inverse(block),
         };
         self.assembled()?;
-        Ok(Plan { work, notes: Vec::new(), internals: None })
+        Ok(MethodPlan { work, notes: Vec::new(), internals: None })
     }
 
     /// Both forms of Eq. (3) and the related rearrangements: P, Q from the substructures, M from
@@ -85,7 +85,7 @@ impl Reduced {
         rooms: &Rooms<'_>,
         name: Method,
         internals: Rearrangement<'a>,
-    ) -> Result<Plan<'a>, RefusedReason> {
+    ) -> Result<MethodPlan<'a>, RefusedReason> {
         let mut notes = Vec::new();
         let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
         let n_c = self.idms.count();
@@ -118,7 +118,7 @@ impl Reduced {
                  so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
             ));
         }
-        Ok(Plan { work: Work::Internals(Box::new(internals)), notes, internals: found })
+        Ok(MethodPlan { work: Work::Internals(Box::new(internals)), notes, internals: found })
     }
 }
 
@@ -140,20 +140,25 @@ pub(super) enum Stage {
 }
 
 /// The refusal of a line.
-pub(super) struct Refusal {
+pub(super) struct LineRefusal {
     pub(super) stage: Stage,
     pub(super) reason: RefusedReason,
 }
 
 impl Stage {
-    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> Refusal {
-        move |reason| Refusal { stage: self, reason: reason.into() }
+    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> LineRefusal {
+        move |reason| LineRefusal { stage: self, reason: reason.into() }
     }
 }
 
 impl Reduced {
     /// Z^J of one separate line, for lines near rank loss or with a refusal. Rotations in metres.
-    pub(super) fn with_care(&self, rooms: &Rooms<'_>, work: &Work<'_>, l: usize) -> Result<Line, Refusal> {
+    pub(super) fn with_care(
+        &self,
+        rooms: &Rooms<'_>,
+        work: &Work<'_>,
+        l: usize,
+    ) -> Result<Line, LineRefusal> {
         let alone = |side| self.alone_at(rooms, side, l).map_err(Stage::Method.refuses());
         let assembly = || self.assembly_at(rooms, l).map_err(Stage::Assembly.refuses());
         let impedance = || Self::impedance_of(rooms, l, &assembly()?).map_err(Stage::Impedance.refuses());

@@ -107,7 +107,7 @@ pub enum VirtualPointsError {
 
 /// One side of the matrix: the overall transformation, T_u (new × old) or T_f (old × new), and the
 /// new names.
-struct Side {
+struct MatrixSide {
     t: DMatrix<f64>,
     names: Vec<String>,
 }
@@ -163,7 +163,7 @@ fn outputs_side(
     geometry: &Configuration,
     virtual_points: &[VirtualPoint],
     weights: Option<&Vec<f64>>,
-) -> Result<Side, VirtualPointsError> {
+) -> Result<MatrixSide, VirtualPointsError> {
     let known = (geometry.channels.as_slice(), geometry.output_names());
     let chosen: Vec<(&VirtualPoint, &[String])> =
         virtual_points.iter().map(|vp| (vp, vp.outputs.as_slice())).collect();
@@ -175,7 +175,7 @@ fn inputs_side(
     geometry: &Configuration,
     virtual_points: &[VirtualPoint],
     weights: Option<&Vec<f64>>,
-) -> Result<Side, VirtualPointsError> {
+) -> Result<MatrixSide, VirtualPointsError> {
     let known = (geometry.impacts.as_slice(), geometry.input_names());
     let chosen: Vec<(&VirtualPoint, &[String])> =
         virtual_points.iter().map(|vp| (vp, vp.inputs.as_slice())).collect();
@@ -184,7 +184,7 @@ fn inputs_side(
         Ok(Transformation { t: found.t.transpose(), ..found })
     };
     let side = side("input", frf.inputs(), &known, &chosen, weights, transposed)?;
-    Ok(Side { t: side.t.transpose(), ..side })
+    Ok(MatrixSide { t: side.t.transpose(), ..side })
 }
 
 /// One side as new × old.
@@ -195,7 +195,7 @@ fn side(
     chosen: &[(&VirtualPoint, &[String])],
     weights: Option<&Vec<f64>>,
     one: impl Fn(&[Point], Vector3<f64>, IdmSet, Option<&[f64]>) -> Result<Transformation, VptError>,
-) -> Result<Side, VirtualPointsError> {
+) -> Result<MatrixSide, VirtualPointsError> {
     let mut free = vec![true; names.len()];
     let mut rows: Vec<(String, Vec<(usize, f64)>)> = Vec::new();
     for (vp, wanted) in chosen {
@@ -234,7 +234,7 @@ fn side(
             t[(r, c)] = value;
         }
     }
-    Ok(Side { t, names: rows.into_iter().map(|(name, _)| name).collect() })
+    Ok(MatrixSide { t, names: rows.into_iter().map(|(name, _)| name).collect() })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::Verdict;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -94,12 +94,12 @@ const QUEUE: usize = 16;
 pub enum Edit {
     /// A line in the campaign's log.
     Note(String),
-    /// A different verdict for a record: [`Kind::Good`] keeps it, [`Kind::Dropped`] leaves it out.
+    /// A different verdict for a record: [`Verdict::Good`] keeps it, [`Verdict::Dropped`] leaves it out.
     Overrule {
         /// The record.
         record: i64,
         /// The new verdict.
-        verdict: Kind,
+        verdict: Verdict,
         /// The reason.
         reason: String,
     },
@@ -111,12 +111,12 @@ pub enum Edit {
 }
 
 /// The result reported to the requester: a sentence, or the reason for failure.
-pub type Told = Result<String, String>;
+pub type EditResult = Result<String, String>;
 
 /// A requested change, and the callback for its result.
 pub struct Request {
     edit: Edit,
-    tell: Box<dyn FnOnce(Told) + Send>,
+    tell: Box<dyn FnOnce(EditResult) + Send>,
 }
 
 /// Why an edit is not accepted.
@@ -147,7 +147,11 @@ impl Desk {
     ///
     /// # Errors
     /// The edit cannot be accepted.
-    pub fn hand_in(&self, edit: Edit, tell: impl FnOnce(Told) + Send + 'static) -> Result<(), NotTaken> {
+    pub fn hand_in(
+        &self,
+        edit: Edit,
+        tell: impl FnOnce(EditResult) + Send + 'static,
+    ) -> Result<(), NotTaken> {
         self.0.try_send(Request { edit, tell: Box::new(tell) }).map_err(|error| match error {
             TrySendError::Full(_) => NotTaken::Busy,
             TrySendError::Disconnected(_) => NotTaken::Over,
@@ -189,7 +193,7 @@ impl Edits {
 
 /// Carries out one edit. A record that is missing or has no samples makes the edit invalid; a file
 /// that cannot be written is an error of the run.
-fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError> {
+fn done(store: &Store, edit: Edit) -> Result<(EditResult, Option<Recount>), StoreError> {
     let (record, wanted, reason) = match edit {
         Edit::Note(text) => {
             store.log(&format!("note: {text}"))?;
@@ -209,27 +213,27 @@ fn done(store: &Store, edit: Edit) -> Result<(Told, Option<Recount>), StoreError
             None => return Ok((Err(format!("record {record}: nobody has overruled its verdict")), None)),
         },
     };
-    if verdict == Kind::Good && row.scans == 0 {
+    if verdict == Verdict::Good && row.scans == 0 {
         return Ok((Err(format!("record {record} has no samples: the bolt did not arrive")), None));
     }
     if verdict == row.standing() {
         return Ok((Ok(format!("record {record}: {verdict} already")), None));
     }
     store.overrule(record, verdict, &reason)?;
-    let (was, is) = (row.kept(), verdict == Kind::Good);
+    let (was, is) = (row.kept(), verdict == Verdict::Good);
     let recount = (was != is).then_some(Recount { cell: row.cell, more: is });
     Ok((Ok(format!("record {record}: {}, now {verdict}: {reason}", row.standing())), recount))
 }
 
 /// The verdict that was valid before a record was last overruled; `None` if `judged` was never
 /// overruled.
-fn before_last(store: &Store, record: i64, judged: Kind) -> Result<Option<Kind>, StoreError> {
+fn before_last(store: &Store, record: i64, judged: Verdict) -> Result<Option<Verdict>, StoreError> {
     let all = store.overrules()?;
     let mut own = all.iter().rev().filter(|overrule| overrule.record == record);
     if own.next().is_none() {
         return Ok(None);
     }
-    Ok(Some(own.next().and_then(|before| Kind::named(&before.verdict)).unwrap_or(judged)))
+    Ok(Some(own.next().and_then(|before| Verdict::named(&before.verdict)).unwrap_or(judged)))
 }
 
 #[cfg(test)]
@@ -275,9 +279,10 @@ mod edits_tests {
         assert_eq!(edits.work_off(&store).expect("written"), []);
         assert_eq!(told.lock().expect("whole").len(), QUEUE);
         // an edit that fails is reported, and does not end the run
-        for edit in
-            [Edit::Undo { record: 1 }, Edit::Overrule { record: 1, verdict: Kind::Good, reason: "x".into() }]
-        {
+        for edit in [
+            Edit::Undo { record: 1 },
+            Edit::Overrule { record: 1, verdict: Verdict::Good, reason: "x".into() },
+        ] {
             assert_eq!(hand_in(edit), Ok(()));
         }
         assert_eq!(edits.work_off(&store).expect("written"), []);

@@ -16,7 +16,7 @@ use crate::campaign::plan::{Cell, Settle, configuration_name};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::codec;
 use crate::campaign::verdict::others::Others;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::campaign::watch::{Left, Seen, Standing};
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
@@ -104,7 +104,7 @@ impl Runner<'_> {
                     quiet = after(&recording, self.channels, self.plan.settle.get_ref(), allowance);
                     self.saw(&Seen::Judging);
                     let verdict = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
-                    if verdict.kind == Kind::Good {
+                    if verdict.kind == Verdict::Good {
                         others.learn(self.plan, self.channels, recording.view());
                     }
                     self.keep(row, *recording, verdict)?;
@@ -117,7 +117,7 @@ impl Runner<'_> {
                     );
                     let judged = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     let verdict =
-                        Verdict { kind: Kind::Noisy, measure: ratio, limit: 1.0, sentence, ..judged };
+                        Judgement { kind: Verdict::Noisy, measure: ratio, limit: 1.0, sentence, ..judged };
                     quiet = after(&recording, self.channels, self.plan.settle.get_ref(), by_hand::ALLOWANCE);
                     self.keep(row, *recording, verdict)?;
                 }
@@ -129,10 +129,10 @@ impl Runner<'_> {
                     let limit = self.plan.limits.get_ref().weak_n;
                     let sentence = format!("the bolt did not arrive with a pulse of {pulse_us} us");
                     let verdict = if lost == 0 {
-                        Verdict::without_pulse(Kind::Weak, 0.0, limit, sentence)
+                        Judgement::without_pulse(Verdict::Weak, 0.0, limit, sentence)
                     } else {
                         let sentence = format!("{sentence}, and {lost} scans were lost meanwhile");
-                        Verdict::without_pulse(Kind::Gap, lost as f64, 0.0, sentence)
+                        Judgement::without_pulse(Verdict::Gap, lost as f64, 0.0, sentence)
                     };
                     let recording = Recording {
                         epoch: 0,

@@ -36,7 +36,7 @@ pub struct Announced {
 }
 
 /// An entry to be stored.
-enum Entry {
+enum PendingEntry {
     Record(Box<(NewRecord, Announced)>, Counters),
     GivenUp {
         cell: i64,
@@ -69,7 +69,7 @@ enum Entry {
 
 /// The thread that stores.
 pub struct Keeper {
-    queue: Option<SyncSender<Entry>>,
+    queue: Option<SyncSender<PendingEntry>>,
     thread: Option<JoinHandle<(Store, Result<(), StoreError>)>>,
     recounts: Receiver<Recount>,
 }
@@ -99,60 +99,60 @@ impl Keeper {
     /// [`Keeper::finish`] returns the error.
     #[must_use]
     pub fn record(&self, record: NewRecord, counters: Counters, announced: Announced) -> bool {
-        self.send(Entry::Record(Box::new((record, announced)), counters))
+        self.send(PendingEntry::Record(Box::new((record, announced)), counters))
     }
 
     /// Marks a cell as done with the hits that it has. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn settle(&self, cell: i64, reason: &str) -> bool {
-        self.send(Entry::Settled { cell, reason: reason.into() })
+        self.send(PendingEntry::Settled { cell, reason: reason.into() })
     }
 
     /// Overrules a cell's good records because a person wants the cell struck again. Returns as
     /// [`Keeper::record`] does.
     #[must_use]
     pub fn redo(&self, cell: i64, reason: &str) -> bool {
-        self.send(Entry::Redo { cell, reason: reason.into() })
+        self.send(PendingEntry::Redo { cell, reason: reason.into() })
     }
 
     /// Stores the link's counters at the end of a session. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn link(&self, session: i64, counters: Counters) -> bool {
-        self.send(Entry::Link { session, counters })
+        self.send(PendingEntry::Link { session, counters })
     }
 
     /// Gives a cell up. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn give_up(&self, cell: i64, reason: &str) -> bool {
-        self.send(Entry::GivenUp { cell, reason: reason.into() })
+        self.send(PendingEntry::GivenUp { cell, reason: reason.into() })
     }
 
     /// Adds a line to the campaign's log. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn log(&self, text: String) -> bool {
-        self.send(Entry::Log(text))
+        self.send(PendingEntry::Log(text))
     }
 
     /// Stores the specimen's temperature, °C. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn temperature(&self, session: i64, celsius: f64) -> bool {
-        self.send(Entry::Temperature { session, celsius })
+        self.send(PendingEntry::Temperature { session, celsius })
     }
 
     /// Stores edges of the sync input and output. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn edges(&self, session: i64, edges: Vec<Edge>) -> bool {
-        self.send(Entry::Edges { session, edges })
+        self.send(PendingEntry::Edges { session, edges })
     }
 
     /// Waits until everything handed over is in the file. Returns as [`Keeper::record`] does.
     #[must_use]
     pub fn catch_up(&self) -> bool {
         let (to, done) = sync_channel(1);
-        self.send(Entry::Waited(to)) && done.recv().is_ok()
+        self.send(PendingEntry::Waited(to)) && done.recv().is_ok()
     }
 
-    fn send(&self, entry: Entry) -> bool {
+    fn send(&self, entry: PendingEntry) -> bool {
         self.queue.as_ref().is_some_and(|queue| queue.send(entry).is_ok())
     }
 
@@ -183,22 +183,22 @@ impl Drop for Keeper {
     }
 }
 
-fn keep(store: &Store, entry: Entry, watch: &Watchers) -> Result<(), StoreError> {
+fn keep(store: &Store, entry: PendingEntry, watch: &Watchers) -> Result<(), StoreError> {
     match entry {
-        Entry::Record(record, counters) => {
+        PendingEntry::Record(record, counters) => {
             let (record, Announced { row, kept, left }) = &*record;
             store.insert(record, &counters)?;
             watch.saw(&Seen::Judged { row, verdict: &record.verdict, kept: *kept, left: *left });
             Ok(())
         }
-        Entry::Settled { cell, reason } => store.settle(cell, &reason),
-        Entry::Redo { cell, reason } => store.redo(cell, &reason).map(drop),
-        Entry::Link { session, counters } => store.note_link(session, &counters),
-        Entry::GivenUp { cell, reason } => store.give_up(cell, &reason),
-        Entry::Log(text) => store.log(&text),
-        Entry::Temperature { session, celsius } => store.note_temperature(session, celsius),
-        Entry::Edges { session, edges } => store.note_edges(session, &edges),
-        Entry::Waited(by) => {
+        PendingEntry::Settled { cell, reason } => store.settle(cell, &reason),
+        PendingEntry::Redo { cell, reason } => store.redo(cell, &reason).map(drop),
+        PendingEntry::Link { session, counters } => store.note_link(session, &counters),
+        PendingEntry::GivenUp { cell, reason } => store.give_up(cell, &reason),
+        PendingEntry::Log(text) => store.log(&text),
+        PendingEntry::Temperature { session, celsius } => store.note_temperature(session, celsius),
+        PendingEntry::Edges { session, edges } => store.note_edges(session, &edges),
+        PendingEntry::Waited(by) => {
             // the waiting thread may have ended
             let _ = by.send(());
             Ok(())
@@ -209,7 +209,7 @@ fn keep(store: &Store, entry: Entry, watch: &Watchers) -> Result<(), StoreError>
 /// Stores incoming entries, and carries out requested edits in between.
 fn keep_and_edit(
     store: &Store,
-    entries: &Receiver<Entry>,
+    entries: &Receiver<PendingEntry>,
     edits: &Edits,
     recounts: &Sender<Recount>,
     watch: &Watchers,

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 /// A bar over the hits of the campaign, with the remaining time of cell, configuration and
 /// campaign; without a terminal, a line of text every ten seconds.
 #[derive(Default)]
-pub struct Progress {
+pub struct CampaignProgress {
     state: Mutex<Option<State>>,
 }
 
@@ -61,7 +61,7 @@ struct State {
     aside_since: Option<Instant>,
 }
 
-impl Watch for Progress {
+impl Watch for CampaignProgress {
     fn saw(&self, seen: &Seen<'_>) {
         let mut state = self.state();
         if let Seen::Begun { wanted, kept } = *seen {
@@ -104,7 +104,7 @@ impl Watch for Progress {
     }
 }
 
-impl Progress {
+impl CampaignProgress {
     fn state(&self) -> MutexGuard<'_, Option<State>> {
         // a bar that a panic left half drawn is redrawn
         self.state.lock().unwrap_or_else(PoisonError::into_inner)

@@ -37,7 +37,7 @@ const ODD: f64 = 0.2;
 
 /// A hit as the loop uses it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
+pub struct PulseHit {
     /// Coil pulse, µs.
     pub pulse_us: u32,
     /// Peak force, N; 0 when the bolt did not arrive.
@@ -49,7 +49,7 @@ pub struct Hit {
 pub struct PulseLoop {
     force: Force,
     cap_us: u32,
-    hits: Vec<Hit>,
+    hits: Vec<PulseHit>,
     pulse_us: f64,
     /// Whether the last hit was an outlier.
     odd: bool,
@@ -69,7 +69,7 @@ impl PulseLoop {
     }
 
     /// Updates the loop with a hit.
-    pub fn learn(&mut self, hit: Hit) {
+    pub fn learn(&mut self, hit: PulseHit) {
         let [shortest, longest] = self.force.pulse_bounds_us;
         let pulse = f64::from(hit.pulse_us);
         let is_odd = self.is_odd(hit);
@@ -98,13 +98,13 @@ impl PulseLoop {
     /// The mean peak over hits with (nearly) this pulse, which averages the scatter, and their
     /// number.
     fn usual(&self, pulse: f64) -> (f64, f64) {
-        let near = |hit: &&Hit| (f64::from(hit.pulse_us) / pulse - 1.0).abs() < 0.01;
+        let near = |hit: &&PulseHit| (f64::from(hit.pulse_us) / pulse - 1.0).abs() < 0.01;
         let (sum, count) =
             self.hits.iter().filter(near).fold((0.0, 0.0), |(sum, n), hit| (sum + hit.peak_n, n + 1.0));
         (sum / count, count)
     }
 
-    fn is_odd(&self, hit: Hit) -> bool {
+    fn is_odd(&self, hit: PulseHit) -> bool {
         let (usual, count) = self.usual(f64::from(hit.pulse_us));
         count >= 2.0 && hit.peak_n > 0.0 && (hit.peak_n / usual).ln().abs() > ODD
     }
@@ -257,11 +257,11 @@ mod tests {
         pulse_bounds_us: [500, 8_000],
     };
 
-    fn settle(peak: impl Fn(u32, usize) -> f64) -> Vec<Hit> {
+    fn settle(peak: impl Fn(u32, usize) -> f64) -> Vec<PulseHit> {
         let mut pulse = PulseLoop::new(&FORCE, 8_000);
         (0..24)
             .map(|shot| {
-                let hit = Hit { pulse_us: pulse.pulse_us(), peak_n: peak(pulse.pulse_us(), shot) };
+                let hit = PulseHit { pulse_us: pulse.pulse_us(), peak_n: peak(pulse.pulse_us(), shot) };
                 pulse.learn(hit);
                 hit
             })
@@ -290,7 +290,7 @@ mod tests {
         let mut pulse = PulseLoop::new(&FORCE, 8_000);
         let mut strike = |peak_n: f64| {
             let pulse_us = pulse.pulse_us();
-            pulse.learn(Hit { pulse_us, peak_n });
+            pulse.learn(PulseHit { pulse_us, peak_n });
             pulse.pulse_us()
         };
         for peak in [50.5, 49.0, 50.0] {
@@ -317,7 +317,7 @@ mod tests {
             let us = f64::from(pulse.pulse_us());
             let accident = if shot % 10 == 7 { 0.35 } else { 1.0 };
             let peak_n = (us - 1_000.0) * 0.022 * (1.0 + 0.07 * dice()) * accident;
-            pulse.learn(Hit { pulse_us: pulse.pulse_us(), peak_n });
+            pulse.learn(PulseHit { pulse_us: pulse.pulse_us(), peak_n });
             if shot > 20 && accident == 1.0 {
                 peaks.push(peak_n);
             }
@@ -331,14 +331,14 @@ mod tests {
         assert!(settle(|_, _| 0.0).iter().all(|hit| hit.pulse_us <= 8_000));
         assert!(settle(|_, _| 1e6).iter().all(|hit| hit.pulse_us >= 500));
         let mut capped = PulseLoop::new(&FORCE, 2_500);
-        capped.learn(Hit { pulse_us: 2_500, peak_n: 0.0 });
+        capped.learn(PulseHit { pulse_us: 2_500, peak_n: 0.0 });
         assert_eq!(capped.pulse_us(), 2_500);
     }
 
     #[test]
     fn a_good_hit_leaves_the_pulse_alone() {
         let mut pulse = PulseLoop::new(&FORCE, 8_000);
-        pulse.learn(Hit { pulse_us: 3_000, peak_n: 51.5 });
+        pulse.learn(PulseHit { pulse_us: 3_000, peak_n: 51.5 });
         assert_eq!(pulse.pulse_us(), 3_000);
     }
 }

@@ -20,7 +20,7 @@ use super::answers::{Edits, Recount};
 use super::clock::ScanClock;
 use super::keeper::{Announced, Keeper};
 use super::pulse::fitted;
-use super::pulse::{FIRST_SLOPE, Hit, PulseLoop};
+use super::pulse::{FIRST_SLOPE, PulseHit, PulseLoop};
 use super::shot::Shooter;
 use super::stage::same_or_accepted;
 use super::stage::{Stage, StageError};
@@ -36,7 +36,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::Judge;
 use crate::campaign::verdict::others::Others;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
 use crate::device::error::DeviceError;
@@ -150,7 +150,8 @@ pub fn run(
     });
     let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
     for record in records.iter().flatten() {
-        forces.learn_judged(record.verdict, Hit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
+        forces
+            .learn_judged(record.verdict, PulseHit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
@@ -284,7 +285,7 @@ impl Runner<'_> {
         &mut self,
         row: &CellRow,
         recording: Recording,
-        verdict: Verdict,
+        verdict: Judgement,
     ) -> Result<(), RunError> {
         self.mark()?;
         if self.hits.is_multiple_of(HITS_PER_TEMPERATURE) {
@@ -293,9 +294,10 @@ impl Runner<'_> {
         self.hits += 1;
         let shot = recording.shot;
         if self.plan.by_hand().is_none() {
-            self.forces.learn_judged(verdict.kind, Hit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
+            self.forces
+                .learn_judged(verdict.kind, PulseHit { pulse_us: shot.pulse_us, peak_n: verdict.peak_n });
         }
-        let attempt = self.tally.add(row.id, verdict.kind == Kind::Good);
+        let attempt = self.tally.add(row.id, verdict.kind == Verdict::Good);
         let standing = Announced { row: row.clone(), kept: self.tally.kept(), left: self.left(row) };
         self.saw(&Seen::Link(self.session.accounts()));
         log::debug!("{:?} attempt {attempt}: {} ({})", row.cell, verdict.kind, verdict.sentence);
@@ -516,15 +518,15 @@ impl Forces {
     /// Updates the loop after a hit was judged. A record with missing samples is ignored: its peak
     /// may be among the missing samples, and the loop would lengthen the pulse because of a fault
     /// of the link.
-    pub fn learn_judged(&mut self, judged: Kind, hit: Hit) {
-        if judged != Kind::Gap {
+    pub fn learn_judged(&mut self, judged: Verdict, hit: PulseHit) {
+        if judged != Verdict::Gap {
             self.learn(hit);
         }
     }
 
     /// Updates the loop whose pulse is nearest to the hit's, so that replaying a stored campaign
     /// reproduces the state of the running one.
-    fn learn(&mut self, hit: Hit) {
+    fn learn(&mut self, hit: PulseHit) {
         if let Some(own) = self.0.iter_mut().min_by_key(|own| own.pulse_us().abs_diff(hit.pulse_us)) {
             own.learn(hit);
         }
@@ -587,7 +589,7 @@ mod tests {
     fn strike(forces: &mut Forces, kept: u32) -> f64 {
         let pulse_us = forces.pulse_us(kept);
         let peak_n = (f64::from(pulse_us) - 1_500.0).max(0.0) * 0.02;
-        forces.learn(Hit { pulse_us, peak_n });
+        forces.learn(PulseHit { pulse_us, peak_n });
         peak_n
     }
 
@@ -607,7 +609,7 @@ mod tests {
         // a refused hit is repeated with the same force
         for kept in [0, 0, 1, 2, 3, 3, 4, 5] {
             let pulse_us = forces.pulse_us(kept);
-            stored.push(Hit { pulse_us, peak_n: (f64::from(pulse_us) - 1_500.0) * 0.025 });
+            stored.push(PulseHit { pulse_us, peak_n: (f64::from(pulse_us) - 1_500.0) * 0.025 });
             forces.learn(stored[stored.len() - 1]);
         }
         let mut resumed = Forces::new(&FORCE, 8_000);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::Rows;
-use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::Verdict;
 
 /// Progress of one cell.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub struct Count {
     /// Records whose description is damaged.
     pub damaged: u32,
     /// Refused records by verdict.
-    pub refused: BTreeMap<Kind, u32>,
+    pub refused: BTreeMap<Verdict, u32>,
 }
 
 impl Count {
@@ -120,7 +120,7 @@ impl Tally {
             } else {
                 count.kept = count.kept.saturating_sub(1);
                 count.settled = false;
-                *count.refused.entry(Kind::Dropped).or_default() += 1;
+                *count.refused.entry(Verdict::Dropped).or_default() += 1;
             }
         });
     }
@@ -133,7 +133,7 @@ impl Tally {
     /// Restarts a cell: its good records are dropped.
     pub fn redo(&mut self, id: i64) {
         self.filled(id, |count| {
-            *count.refused.entry(Kind::Dropped).or_default() += count.kept;
+            *count.refused.entry(Verdict::Dropped).or_default() += count.kept;
             (count.kept, count.settled, count.given_up) = (0, false, false);
         });
     }

@@ -5,7 +5,7 @@ use crate::campaign::store::error::StoreError;
 use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
 use crate::frf::{Frf, MotionQuantity};
@@ -33,7 +33,7 @@ fn map() -> ChannelMap {
     ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels }
 }
 
-fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
+fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
     let shot = Shot {
         number: attempt + 1,
         phase: Phase::Done,
@@ -50,7 +50,7 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
     let codes = (0..400_i32).map(|i| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16).collect();
     let recording =
         Recording { epoch: 3, first_scan: 144, trigger_index: 25, channels: 2, codes, gaps: vec![], shot };
-    let verdict = Verdict { peak_n: 49.5, ..Verdict::without_pulse(kind, 0.1, 0.02, "because".into()) };
+    let verdict = Judgement { peak_n: 49.5, ..Judgement::without_pulse(kind, 0.1, 0.02, "because".into()) };
     NewRecord {
         cell,
         attempt,
@@ -81,12 +81,12 @@ fn eventful(path: &Path) -> Store {
     let mut store = Store::create(path, SMALL, "small.toml").expect("created");
     let session = begin_session(&mut store);
     for attempt in 0..4 {
-        let kind = if attempt == 2 { Kind::Noisy } else { Kind::Good };
+        let kind = if attempt == 2 { Verdict::Noisy } else { Verdict::Good };
         let counters = Counters::from([("scans_received".into(), u64::from(attempt))]);
         store.insert(&record(1, attempt, session, kind), &counters).expect("stored");
     }
-    store.overrule(1, Kind::Dropped, "a lorry").expect("dropped");
-    store.overrule(1, Kind::Good, "no lorry").expect("kept");
+    store.overrule(1, Verdict::Dropped, "a lorry").expect("dropped");
+    store.overrule(1, Verdict::Good, "no lorry").expect("kept");
     store.settle(2, "enough").expect("settled");
     store.give_up(3, "out of reach").expect("given up");
     store.redo(1, "again").expect("again");
@@ -154,12 +154,12 @@ fn deed(store: &mut Store, dice: &mut Xoshiro256PlusPlus) {
         (0, ..) | (_, None, _) => drop(begin_session(store)),
         (1..=5, Some(session), _) => {
             let attempt = store.records_of(cell).expect("records").len() as u32;
-            let kind = Kind::ALL[number(dice, Kind::ALL.len() as u32) as usize];
+            let kind = Verdict::ALL[number(dice, Verdict::ALL.len() as u32) as usize];
             let counters = Counters::from([("scans_received".into(), u64::from(attempt))]);
             store.insert(&record(cell, attempt, session, kind), &counters).expect("stored");
         }
-        (6, _, Some(id)) => store.overrule(id, Kind::Dropped, "a lorry").expect("dropped"),
-        (7, _, Some(id)) => store.overrule(id, Kind::Good, "no lorry").expect("kept"),
+        (6, _, Some(id)) => store.overrule(id, Verdict::Dropped, "a lorry").expect("dropped"),
+        (7, _, Some(id)) => store.overrule(id, Verdict::Good, "no lorry").expect("kept"),
         (8, ..) => drop(store.redo(cell, "again").expect("opened")),
         (9, ..) => store.settle(cell, "enough").expect("settled"),
         (10, ..) => store.give_up(cell, "out of reach").expect("given up"),

@@ -10,7 +10,7 @@ use super::notes::utc_now;
 use super::session_table::{Counters, write_link};
 use super::table::{Row, insert, table};
 use super::{Store, codec, row_seal};
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::device::stream::{Codes, Recording};
 use jointrig_protocol::shot::Shot;
 use rusqlite::Connection;
@@ -89,7 +89,7 @@ impl Store {
         );
         let read = |row: &rusqlite::Row<'_>| {
             let overruled: Option<String> = row.get(RecordRow::columns().count() + 1)?;
-            let overruled = overruled.as_deref().and_then(Kind::named);
+            let overruled = overruled.as_deref().and_then(Verdict::named);
             Ok(row_seal::read(row)?.map(|found| RecordRow { overruled, ..found }))
         };
         let found = match self.all(&sql, [place.id], read, "reading a record") {
@@ -206,7 +206,7 @@ table! {
             /// Missing samples, as index ranges.
             gaps: Vec<Range<usize>> = "gaps TEXT NOT NULL",
             /// The original verdict.
-            verdict: Kind = "verdict TEXT NOT NULL",
+            verdict: Verdict = "verdict TEXT NOT NULL",
             /// The measured value that it is based on.
             measure: f64 = "measure REAL NOT NULL",
             /// The limit for that value.
@@ -234,13 +234,13 @@ table! {
     }
     beside {
         /// A person's later verdict.
-        overruled: Option<Kind>,
+        overruled: Option<Verdict>,
     }
 }
 
 impl RecordRow {
     /// The verdict in effect: a person's, else the original one.
-    pub fn standing(&self) -> Kind {
+    pub fn standing(&self) -> Verdict {
         self.overruled.unwrap_or(self.verdict)
     }
 
@@ -251,7 +251,7 @@ impl RecordRow {
 
     /// Whether the analysis uses it.
     pub fn kept(&self) -> bool {
-        self.standing() == Kind::Good && self.scans > 0
+        self.standing() == Verdict::Good && self.scans > 0
     }
 }
 
@@ -291,7 +291,7 @@ pub struct NewRecord {
     /// The raw samples; empty if the bolt did not arrive.
     pub recording: Recording,
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: Judgement,
 }
 
 impl NewRecord {
@@ -370,7 +370,7 @@ table! {
 impl Store {
     /// Overrules a record's verdict; the original one is kept in the file. A settled cell that is
     /// left with fewer good hits than it was settled with is reopened.
-    pub fn overrule(&self, record: i64, verdict: Kind, reason: &str) -> Result<(), StoreError> {
+    pub fn overrule(&self, record: i64, verdict: Verdict, reason: &str) -> Result<(), StoreError> {
         self.change("overruling a verdict", |connection| write_overrule(connection, record, verdict, reason))
     }
 
@@ -378,11 +378,11 @@ impl Store {
     /// dropped records.
     pub fn redo(&self, cell: i64, reason: &str) -> Result<usize, StoreError> {
         let records = self.records_of(cell)?;
-        let good = records.iter().flatten().filter(|record| record.standing() == Kind::Good);
+        let good = records.iter().flatten().filter(|record| record.standing() == Verdict::Good);
         let good: Vec<i64> = good.map(|record| record.id).collect();
         self.change("opening a cell again", |connection| {
             for record in &good {
-                write_overrule(connection, *record, Kind::Dropped, reason)?;
+                write_overrule(connection, *record, Verdict::Dropped, reason)?;
             }
             connection.execute("UPDATE cells SET settled = NULL, given_up = NULL WHERE id = ?1", [cell])
         })?;
@@ -396,10 +396,15 @@ impl Store {
     }
 }
 
-fn write_overrule(connection: &Connection, record: i64, verdict: Kind, reason: &str) -> rusqlite::Result<()> {
+fn write_overrule(
+    connection: &Connection,
+    record: i64,
+    verdict: Verdict,
+    reason: &str,
+) -> rusqlite::Result<()> {
     let overrule = Overrule { record, utc: utc_now(), verdict: verdict.name().into(), reason: reason.into() };
     overrule.insert(connection, &[])?;
-    if verdict != Kind::Good {
+    if verdict != Verdict::Good {
         connection.execute(
             "UPDATE cells SET settled = NULL WHERE id = (SELECT cell FROM records WHERE id = ?1)",
             [record],

@@ -4,7 +4,7 @@ use crate::campaign::store::VERSION;
 use crate::campaign::store::notes::utc_now;
 use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
-use crate::campaign::verdict::Verdict;
+use crate::campaign::verdict::Judgement;
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Channel;
@@ -44,7 +44,7 @@ fn info() -> SessionInfo {
     }
 }
 
-fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
+fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
     let shot = Shot {
         number: attempt + 1,
         phase: Phase::Done,
@@ -68,7 +68,7 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Kind) -> NewRecord {
         gaps: vec![3..7, 9..10],
         shot,
     };
-    let verdict = Verdict { peak_n: 49.5, ..Verdict::without_pulse(kind, 0.1, 0.02, "because".into()) };
+    let verdict = Judgement { peak_n: 49.5, ..Judgement::without_pulse(kind, 0.1, 0.02, "because".into()) };
     NewRecord { cell, attempt, session, utc: utc_now(), utc_error_s: Some(0.003), recording, verdict }
 }
 
@@ -87,7 +87,7 @@ fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
     let cells = store.cells().expect("cells");
     assert_eq!(cells.len(), store.plan().expect("plan").cells().len());
     for attempt in 0..3 {
-        let kind = if attempt == 1 { Kind::DoubleHit } else { Kind::Good };
+        let kind = if attempt == 1 { Verdict::DoubleHit } else { Verdict::Good };
         store.insert(&record(cells[0].id, attempt, session, kind), &Counters::new()).expect("stored");
     }
     let stored = rows(&reader);
@@ -99,11 +99,11 @@ fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
         assert_eq!(reader.samples(row).expect("samples").codes, new.codes);
         assert_eq!((row.shot, &row.gaps, row.first_scan), (new.shot, &new.gaps, 144));
     }
-    store.overrule(stored[1].id, Kind::Good, "looked at it").expect("overruled");
+    store.overrule(stored[1].id, Verdict::Good, "looked at it").expect("overruled");
     assert!(rows(&reader)[1].kept());
     assert_eq!(reader.verify().expect("checked"), []);
     assert!(
-        store.insert(&record(cells[0].id, 0, session, Kind::Good), &Counters::new()).is_err(),
+        store.insert(&record(cells[0].id, 0, session, Verdict::Good), &Counters::new()).is_err(),
         "an attempt is stored once"
     );
     store.close().expect("closed");
@@ -117,7 +117,7 @@ fn raw_records_cannot_be_changed_and_damage_is_named() {
     let session = store.begin_session(&info(), &map()).expect("session");
     let ids: Vec<i64> = (0..4)
         .map(|attempt| {
-            store.insert(&record(1, attempt, session, Kind::Good), &Counters::new()).expect("stored")
+            store.insert(&record(1, attempt, session, Verdict::Good), &Counters::new()).expect("stored")
         })
         .collect();
     let change = |sql: &str| store.connection.execute(sql, []);
@@ -187,7 +187,7 @@ fn every_column_of_a_record_is_under_its_seal() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").expect("created");
     let session = store.begin_session(&info(), &map()).expect("session");
-    let id = store.insert(&record(1, 0, session, Kind::Good), &Counters::new()).expect("stored");
+    let id = store.insert(&record(1, 0, session, Verdict::Good), &Counters::new()).expect("stored");
     let before = store.record(id).expect("whole");
     let vandals = "DROP TRIGGER records_stay; DROP TRIGGER seals_stay; PRAGMA foreign_keys = OFF";
     store.connection.execute_batch(vandals).expect("changed");
@@ -225,7 +225,7 @@ fn a_full_disk_is_told_in_words() {
         store.connection.pragma_query_value(None, "page_count", |row| row.get(0)).expect("counted");
     store.connection.pragma_update(None, "max_page_count", pages + 3).expect("set");
     let results: Vec<_> = (0..300)
-        .map(|attempt| store.insert(&record(1, attempt, session, Kind::Good), &Counters::new()))
+        .map(|attempt| store.insert(&record(1, attempt, session, Verdict::Good), &Counters::new()))
         .collect();
     let stored = results.iter().take_while(|result| result.is_ok()).count();
     let said = results[stored].as_ref().expect_err("full").to_string();

@@ -10,7 +10,7 @@ use rusqlite::types::{Value, ValueRef};
 use super::table::Stored;
 use crate::campaign::plan::level::{Held, Moment};
 use crate::campaign::plan::{configuration_name, configuration_named};
-use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::Verdict;
 
 macro_rules! named {
     ($($type:ty: $name:expr, $named:expr;)+) => {
@@ -26,7 +26,7 @@ macro_rules! named {
     };
 }
 named! {
-    Kind: Kind::name, Kind::named;
+    Verdict: Verdict::name, Verdict::named;
     Held: Held::name, |name| name.parse().ok();
     Moment: Moment::name, |name| name.parse().ok();
     Configuration: configuration_name, configuration_named;

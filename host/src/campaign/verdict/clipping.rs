@@ -112,7 +112,7 @@ pub(super) fn plateau(x: &[f64], step: f64) -> Option<Clipped> {
 /// Finds plateaus within `slack` of the signal's highest or lowest value, with corners at least
 /// `fall` deep.
 fn standing(x: &[f64], largest: f64, slack: f64, fall: f64) -> Option<Clipped> {
-    let sides = [1.0, -1.0].map(|sign| Side::of(x, sign, slack, fall));
+    let sides = [1.0, -1.0].map(|sign| Plateaus::of(x, sign, slack, fall));
     let [above, below] = &sides;
     // an amplifier has a positive and a negative limit, and a ring-down reaches both alternately
     let alike = (above.top - below.top).abs() <= slack.max(ALIKE * largest);
@@ -131,7 +131,7 @@ fn standing(x: &[f64], largest: f64, slack: f64, fall: f64) -> Option<Clipped> {
 const BLOCK: usize = 64;
 
 /// The plateaus of a signal at its highest or lowest value.
-struct Side {
+struct Plateaus {
     sign: f64,
     /// That value times the sign.
     top: f64,
@@ -139,7 +139,7 @@ struct Side {
     visits: Vec<usize>,
 }
 
-impl Side {
+impl Plateaus {
     fn of(x: &[f64], sign: f64, slack: f64, fall: f64) -> Self {
         let top = x.iter().fold(f64::NEG_INFINITY, |most, v| most.max(sign * v));
         let (mut start, mut visits) = (None, Vec::new());

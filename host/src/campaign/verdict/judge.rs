@@ -1,7 +1,7 @@
 //! Judging a record: the trait, and its implementation.
 
 use super::others::{self, Others};
-use super::{Kind, Limits, RawHit, Verdict};
+use super::{Judgement, Limits, RawHit, Verdict};
 use crate::campaign::plan::{Cell, Plan};
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
@@ -18,7 +18,7 @@ pub trait Judge {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict;
+    ) -> Judgement;
 }
 
 /// Judges by the raw record itself ([`super::judge`](fn@super::judge)): hammer force and all motion
@@ -34,7 +34,7 @@ impl Judge for ByRecord {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict {
+    ) -> Judgement {
         let si = |place: usize| -> Vec<f64> {
             let unit = channels.channels.get(place).map_or(f64::NAN, Channel::units_per_code);
             recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
@@ -64,27 +64,27 @@ impl Judge for ByRecord {
         };
         let found = super::judge(hit, &limits, Some(wanted.target_n));
         let judged =
-            |kind, measure, limit, sentence| Verdict { kind, measure, limit, sentence, ..found.clone() };
+            |kind, measure, limit, sentence| Judgement { kind, measure, limit, sentence, ..found.clone() };
         // a channel at the end of its converter's range spoils the record whatever the hammer did;
         // ranges differ between channels, so each is checked in its own codes
         if missing == 0
             && let Some((name, touched)) = over_range(channels, recording)
         {
             let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
-            return judged(Kind::Overload, touched as f64, 1.0, sentence);
+            return judged(Verdict::Overload, touched as f64, 1.0, sentence);
         }
-        if found.kind == Kind::Good
+        if found.kind == Verdict::Good
             && let Some((name, ratio)) = noisier(channels, recording, others, given.noise_ratio)
         {
             let limit = given.noise_ratio;
             let sentence = format!(
                 "channel {name} is {ratio:.1} times as noisy as in the cell's other records (at most {limit:.1})"
             );
-            return judged(Kind::Noisy, ratio, limit, sentence);
+            return judged(Verdict::Noisy, ratio, limit, sentence);
         }
         match found.kind {
-            Kind::Noisy | Kind::Overload => {
-                Verdict { sentence: name_responses(&found.sentence, &names), ..found }
+            Verdict::Noisy | Verdict::Overload => {
+                Judgement { sentence: name_responses(&found.sentence, &names), ..found }
             }
             _ => found,
         }

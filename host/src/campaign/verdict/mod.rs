@@ -8,7 +8,7 @@
 //! suffices to refuse a hit; a defect found by an earlier check would corrupt the values of the
 //! later ones.)
 //!
-//! A new verdict is a new [`Kind`], a file with its check here, and its place in
+//! A new verdict is a new [`Verdict`], a file with its check here, and its place in
 //! [`judge`](fn@judge). The limits are [`Limits`]: the double-hit threshold is `rebound_fraction`,
 //! which a plan sets (`limits.rebound_ratio`) and [`judge::ByRecord`] passes on.
 
@@ -23,9 +23,9 @@ mod synthetic_tests;
 use crate::spectra::{ImpactRecords, Pulse, reversed_peak_n, several_hits_s};
 use serde::{Deserialize, Serialize};
 
-/// Kind of verdict. Only [`Kind::Good`] hits enter an average.
+/// Kind of verdict. Only [`Verdict::Good`] hits enter an average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Kind {
+pub enum Verdict {
     /// Usable.
     #[serde(rename = "good")]
     Good,
@@ -56,7 +56,7 @@ pub enum Kind {
     Dropped,
 }
 
-impl Kind {
+impl Verdict {
     /// Every kind, good first.
     pub const ALL: [Self; 9] = [
         Self::Good,
@@ -78,20 +78,20 @@ impl Kind {
     /// Its name in results.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Good => "good",
-            Kind::DoubleHit => "double hit",
-            Kind::Overload => "overload",
-            Kind::Noisy => "noisy",
-            Kind::Weak => "weak",
-            Kind::Strong => "strong",
-            Kind::Mistimed => "mistimed",
-            Kind::Gap => "gap",
-            Kind::Dropped => "dropped",
+            Verdict::Good => "good",
+            Verdict::DoubleHit => "double hit",
+            Verdict::Overload => "overload",
+            Verdict::Noisy => "noisy",
+            Verdict::Weak => "weak",
+            Verdict::Strong => "strong",
+            Verdict::Mistimed => "mistimed",
+            Verdict::Gap => "gap",
+            Verdict::Dropped => "dropped",
         }
     }
 }
 
-impl std::fmt::Display for Kind {
+impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
     }
@@ -99,9 +99,9 @@ impl std::fmt::Display for Kind {
 
 /// A verdict with its evidence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct Judgement {
     /// The kind.
-    pub kind: Kind,
+    pub kind: Verdict,
     /// The measured value that it is based on, in the unit stated in `sentence`.
     pub measure: f64,
     /// The limit for that value, in the same unit.
@@ -114,9 +114,9 @@ pub struct Verdict {
     pub start_s: f64,
 }
 
-impl Verdict {
+impl Judgement {
     /// A verdict on a record without a pulse.
-    pub fn without_pulse(kind: Kind, measure: f64, limit: f64, sentence: String) -> Self {
+    pub fn without_pulse(kind: Verdict, measure: f64, limit: f64, sentence: String) -> Self {
         Self { kind, measure, limit, sentence, peak_n: 0.0, start_s: 0.0 }
     }
 }
@@ -181,12 +181,12 @@ pub struct RawHit<'a> {
 
 /// Judges one hit. `reference_peak_n` is the target peak (or the median of the set); without it,
 /// weak means no pulse above noise.
-pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) -> Verdict {
+pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) -> Judgement {
     let pulse = Pulse::locate(hit.force_n);
-    let verdict = |kind, measure, limit, sentence: String| Verdict {
+    let verdict = |kind, measure, limit, sentence: String| Judgement {
         peak_n: pulse.map_or(0.0, |p| p.peak_n),
         start_s: pulse.map_or(0.0, |p| p.start as f64 / hit.fs_hz),
-        ..Verdict::without_pulse(kind, measure, limit, sentence)
+        ..Judgement::without_pulse(kind, measure, limit, sentence)
     };
     let broken = std::iter::once(hit.force_n)
         .chain(hit.responses.iter().map(Vec::as_slice))
@@ -195,23 +195,23 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
         .unwrap_or(0);
     let missing = hit.missing_samples as f64 + broken as f64;
     if missing > 0.0 {
-        return verdict(Kind::Gap, missing, 0.0, format!("{missing} samples are missing from the record"));
+        return verdict(Verdict::Gap, missing, 0.0, format!("{missing} samples are missing from the record"));
     }
     if let Some(peak_n) = reversed_peak_n(hit.force_n) {
         let sentence = format!(
             "the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1"
         );
-        return verdict(Kind::Mistimed, peak_n, 0.0, sentence);
+        return verdict(Verdict::Mistimed, peak_n, 0.0, sentence);
     }
     let Some(pulse) = pulse else {
-        return verdict(Kind::Weak, 0.0, 0.0, "there is no force pulse at all".into());
+        return verdict(Verdict::Weak, 0.0, 0.0, "there is no force pulse at all".into());
     };
     // The largest of about 10⁵ noise samples reaches 4.5 times the rms.
     let floor = 10.0 * pulse.noise_n;
     if pulse.peak_n < floor {
         let sentence =
             format!("the highest force of {:.3} N is not above noise ({floor:.3} N)", pulse.peak_n);
-        return verdict(Kind::Weak, pulse.peak_n, floor, sentence);
+        return verdict(Verdict::Weak, pulse.peak_n, floor, sentence);
     }
     for (at, end) in [(0, "begins"), (hit.force_n.len() - 1, "ends")] {
         if (pulse.start..pulse.end).contains(&at) {
@@ -223,7 +223,7 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
                 if at == 0 { "first" } else { "last" },
                 100.0 * height
             );
-            return verdict(Kind::Mistimed, height, 0.0, sentence);
+            return verdict(Verdict::Mistimed, height, 0.0, sentence);
         }
     }
     if let Some(hits_s) = several_hits_s(hit.force_n, hit.fs_hz) {
@@ -235,23 +235,23 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
             hits_s.len(),
             times.join(", ")
         );
-        return verdict(Kind::DoubleHit, hits_s.len() as f64, 1.0, sentence);
+        return verdict(Verdict::DoubleHit, hits_s.len() as f64, 1.0, sentence);
     }
     if let Some(found) = clipping::force(hit.force_n, &pulse, limits.force_range_n) {
-        return verdict(Kind::Overload, found.level, found.limit, found.sentence("force", "N"));
+        return verdict(Verdict::Overload, found.level, found.limit, found.sentence("force", "N"));
     }
     if let Some(range) = limits.response_range {
         for (channel, x) in hit.responses.iter().enumerate() {
             if let Some(found) = clipping::response(x, range) {
                 let name = format!("response {channel}");
-                return verdict(Kind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
+                return verdict(Verdict::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
             }
         }
     }
     for (channel, x) in hit.responses.iter().enumerate() {
         if let Some(found) = clipping::plateau(x, dropout::quantum(x)) {
             let name = format!("response {channel}");
-            return verdict(Kind::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
+            return verdict(Verdict::Overload, found.level, found.limit, found.sentence(&name, "in SI"));
         }
     }
     let from = (limits.rebound_after_s * hit.fs_hz) as usize;
@@ -262,17 +262,17 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
             second.fraction * pulse.peak_n,
             100.0 * second.fraction
         );
-        return verdict(Kind::DoubleHit, second.fraction, second.limit, sentence);
+        return verdict(Verdict::DoubleHit, second.fraction, second.limit, sentence);
     }
     if let Some(reference) = reference_peak_n {
         let (low, high) = (limits.weak_fraction * reference, limits.strong_fraction * reference);
         if pulse.peak_n < low {
             let sentence = format!("a peak of {:.2} N is below {low:.2} N", pulse.peak_n);
-            return verdict(Kind::Weak, pulse.peak_n, low, sentence);
+            return verdict(Verdict::Weak, pulse.peak_n, low, sentence);
         }
         if pulse.peak_n > high {
             let sentence = format!("a peak of {:.2} N is above {high:.2} N", pulse.peak_n);
-            return verdict(Kind::Strong, pulse.peak_n, high, sentence);
+            return verdict(Verdict::Strong, pulse.peak_n, high, sentence);
         }
     }
     for (channel, x) in hit.responses.iter().enumerate() {
@@ -282,7 +282,7 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
                 1e3 * burst.sample as f64 / hit.fs_hz,
                 burst.ratio
             );
-            return verdict(Kind::Noisy, burst.ratio, limits.dropout_ratio, sentence);
+            return verdict(Verdict::Noisy, burst.ratio, limits.dropout_ratio, sentence);
         }
     }
     if let Some(expected) = limits.expected_start_s {
@@ -291,15 +291,15 @@ pub fn judge(hit: RawHit<'_>, limits: &Limits, reference_peak_n: Option<f64>) ->
         let tolerance = limits.start_tolerance_s.max(pulse.width() as f64 / hit.fs_hz);
         if late.abs() > tolerance {
             let sentence = format!("the pulse starts {:.2} ms from where it should", 1e3 * late);
-            return verdict(Kind::Mistimed, late.abs(), tolerance, sentence);
+            return verdict(Verdict::Mistimed, late.abs(), tolerance, sentence);
         }
     }
     let limit = reference_peak_n.map_or(floor, |r| limits.weak_fraction * r);
-    verdict(Kind::Good, pulse.peak_n, limit, format!("one clean pulse of {:.2} N", pulse.peak_n))
+    verdict(Verdict::Good, pulse.peak_n, limit, format!("one clean pulse of {:.2} N", pulse.peak_n))
 }
 
 /// Judges every hit of a set. The reference peak is `target_n`, or the median of the set's peaks.
-pub fn judge_all(records: &ImpactRecords, limits: &Limits, target_n: Option<f64>) -> Vec<Verdict> {
+pub fn judge_all(records: &ImpactRecords, limits: &Limits, target_n: Option<f64>) -> Vec<Judgement> {
     let reference = target_n.or_else(|| {
         let mut peaks: Vec<f64> =
             records.force_n.iter().filter_map(|f| Pulse::locate(f)).map(|p| p.peak_n).collect();

@@ -59,7 +59,7 @@ fn response(start: f64, n: usize, dice: &mut Dice) -> Vec<f64> {
         .collect()
 }
 
-fn verdict(force_n: &[f64], responses: &[Vec<f64>], limits: &Limits) -> Verdict {
+fn verdict(force_n: &[f64], responses: &[Vec<f64>], limits: &Limits) -> Judgement {
     judge(RawHit { fs_hz: FS, force_n, responses, missing_samples: 0 }, limits, Some(50.0))
 }
 
@@ -79,7 +79,7 @@ fn every_rebound_from_two_per_cent_on_is_found() {
             let second = (start + after_ms * 1e-3, fraction * peak, width * dice.uniform(0.9, 1.2));
             let force = force(&[(start, peak, width), second], 8192, &mut dice);
             let v = verdict(&force, &[], &Limits::default());
-            assert_eq!(v.kind, Kind::DoubleHit, "{fraction} after {after_ms} ms: {v:?}");
+            assert_eq!(v.kind, Verdict::DoubleHit, "{fraction} after {after_ms} ms: {v:?}");
             smallest = smallest.min(v.measure / fraction);
         }
     }
@@ -95,7 +95,7 @@ fn ringing_and_noise_raise_no_alarm() {
         let force = force(&[pulse], 12_800, &mut dice);
         let responses = [response(pulse.0, 12_800, &mut dice)];
         let v = verdict(&force, &responses, &Limits::default());
-        assert_eq!(v.kind, Kind::Good, "{v:?}");
+        assert_eq!(v.kind, Verdict::Good, "{v:?}");
         // 1 % of ringing under the peak and 0.5 % of interpolation
         assert!((v.peak_n / pulse.1 - 1.0).abs() < 0.04, "{} for {}", v.peak_n, pulse.1);
     }
@@ -110,14 +110,14 @@ fn a_flat_top_is_an_overload_wherever_the_range_is() {
         for f in &mut force {
             *f = f.min(range);
         }
-        assert_eq!(verdict(&force, &[], &Limits::default()).kind, Kind::Overload, "{range} N");
+        assert_eq!(verdict(&force, &[], &Limits::default()).kind, Verdict::Overload, "{range} N");
         let limits = Limits { force_range_n: Some(range), ..Limits::default() };
-        assert_eq!(verdict(&force, &[], &limits).kind, Kind::Overload);
+        assert_eq!(verdict(&force, &[], &limits).kind, Verdict::Overload);
     }
     let limits = Limits { response_range: Some(1e-3), ..Limits::default() };
     let pulse = clean(&mut dice);
     let (force, responses) = (force(&[pulse], 4096, &mut dice), [response(pulse.0, 4096, &mut dice)]);
-    assert_eq!(verdict(&force, &responses, &limits).kind, Kind::Overload);
+    assert_eq!(verdict(&force, &responses, &limits).kind, Verdict::Overload);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn dropouts_and_spikes_are_noisy_but_plain_noise_is_not() {
             2 => x[at..(at + 150).min(12_800)].iter_mut().for_each(|v| *v += 1e-3),
             _ => x.iter_mut().for_each(|v| *v += 3e-4 * dice.gauss()),
         }
-        let wanted = if case % 4 == 3 { Kind::Good } else { Kind::Noisy };
+        let wanted = if case % 4 == 3 { Verdict::Good } else { Verdict::Noisy };
         let v = verdict(&force, &[x], &Limits::default());
         assert_eq!(v.kind, wanted, "case {case}: {v:?}");
     }
@@ -146,17 +146,17 @@ fn dropouts_and_spikes_are_noisy_but_plain_noise_is_not() {
 fn the_other_kinds() {
     let mut dice = Dice::new();
     let plain = |peak: f64, dice: &mut Dice| force(&[(5e-3, peak, 0.41e-3)], 4096, dice);
-    assert_eq!(verdict(&plain(15.0, &mut dice), &[], &Limits::default()).kind, Kind::Weak);
-    assert_eq!(verdict(&plain(0.0, &mut dice), &[], &Limits::default()).kind, Kind::Weak);
-    assert_eq!(verdict(&[0.0; 1024], &[], &Limits::default()).kind, Kind::Weak);
-    assert_eq!(verdict(&plain(120.0, &mut dice), &[], &Limits::default()).kind, Kind::Strong);
+    assert_eq!(verdict(&plain(15.0, &mut dice), &[], &Limits::default()).kind, Verdict::Weak);
+    assert_eq!(verdict(&plain(0.0, &mut dice), &[], &Limits::default()).kind, Verdict::Weak);
+    assert_eq!(verdict(&[0.0; 1024], &[], &Limits::default()).kind, Verdict::Weak);
+    assert_eq!(verdict(&plain(120.0, &mut dice), &[], &Limits::default()).kind, Verdict::Strong);
     let timed = Limits { expected_start_s: Some(8e-3), ..Limits::default() };
     let v = verdict(&plain(50.0, &mut dice), &[], &timed);
-    assert_eq!(v.kind, Kind::Mistimed);
+    assert_eq!(v.kind, Verdict::Mistimed);
     assert!((v.measure - 3e-3).abs() < 1e-4 && v.limit == 2e-3);
     let force = plain(50.0, &mut dice);
     let hit = RawHit { fs_hz: FS, force_n: &force, responses: &[], missing_samples: 3 };
-    assert_eq!(judge(hit, &Limits::default(), None).kind, Kind::Gap);
+    assert_eq!(judge(hit, &Limits::default(), None).kind, Verdict::Gap);
     // two humps of one long contact
     let merged: Vec<f64> = (0..4096)
         .map(|i| {
@@ -168,7 +168,7 @@ fn the_other_kinds() {
             }
         })
         .collect();
-    assert_eq!(verdict(&merged, &[], &Limits::default()).kind, Kind::DoubleHit);
+    assert_eq!(verdict(&merged, &[], &Limits::default()).kind, Verdict::DoubleHit);
 }
 
 #[test]
@@ -191,11 +191,11 @@ fn a_saturated_amplifier_below_full_scale_is_an_overload_and_a_round_top_is_not(
         let round: Vec<f64> = motion.iter().copied().map(rounded).collect();
         let v = verdict(&force, &[round], &Limits::default());
         // without noise even the corner at the hit counts as a jump
-        assert_ne!(v.kind, Kind::Overload, "case {case}, {hz} Hz: {v:?}");
+        assert_ne!(v.kind, Verdict::Overload, "case {case}, {hz} Hz: {v:?}");
         let top = motion.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let flat = motion.iter().map(|x| rounded(x.clamp(-0.85 * top, 0.85 * top))).collect();
         let v = verdict(&force, &[flat], &Limits::default());
-        assert_eq!(v.kind, Kind::Overload, "case {case}, {hz} Hz: {v:?}");
+        assert_eq!(v.kind, Verdict::Overload, "case {case}, {hz} Hz: {v:?}");
         assert!((v.measure.abs() / (0.85 * top) - 1.0).abs() < 0.01, "{v:?}");
     }
 }
@@ -233,7 +233,7 @@ fn hann_hit(fs_hz: f64, n: usize, start_s: f64, width_s: f64, f0_hz: f64) -> [Ve
     all
 }
 
-fn judged(fs_hz: f64, force_n: &[f64], responses: &[Vec<f64>]) -> Verdict {
+fn judged(fs_hz: f64, force_n: &[f64], responses: &[Vec<f64>]) -> Judgement {
     judge(RawHit { fs_hz, force_n, responses, missing_samples: 0 }, &Limits::default(), None)
 }
 
@@ -253,10 +253,10 @@ fn a_clean_record_is_good_however_quiet_and_slow_it_is_and_a_spike_in_it_is_foun
                     let mut x: Vec<f64> = x.iter().map(|x| x + noise * most * dice.gauss()).collect();
                     let found = judged(fs_hz, &force, &[x.clone()]);
                     let what = format!("{fs_hz} Hz, {samples_of_pulse} samples, noise {noise}: {found:?}");
-                    assert_eq!(found.kind, Kind::Good, "{what}");
+                    assert_eq!(found.kind, Verdict::Good, "{what}");
                     x[n / 2] += 0.3 * most;
                     let found = judged(fs_hz, &force, &[x]);
-                    assert_eq!(found.kind, Kind::Noisy, "a spike, {what}");
+                    assert_eq!(found.kind, Verdict::Noisy, "a spike, {what}");
                 }
             }
         }
@@ -269,15 +269,15 @@ fn a_pulse_that_the_record_holds_only_in_part_is_mistimed() {
     for part in [0.2, 0.33, 0.5, 0.8] {
         let [force, v, _] = hann_hit(10_240.0, n, -part * 1.5e-3, 1.5e-3, 200.0);
         let found = judged(10_240.0, &force, &[v]);
-        assert_eq!(found.kind, Kind::Mistimed, "{part}: {found:?}");
+        assert_eq!(found.kind, Verdict::Mistimed, "{part}: {found:?}");
         assert!(found.sentence.contains("begins within the pulse"), "{found:?}");
         let [force, v, _] = hann_hit(10_240.0, n, n as f64 / 10_240.0 - part * 1.5e-3, 1.5e-3, 200.0);
         let found = judged(10_240.0, &force, &[v]);
-        assert!(found.kind == Kind::Mistimed && found.sentence.contains("ends within"), "{found:?}");
+        assert!(found.kind == Verdict::Mistimed && found.sentence.contains("ends within"), "{found:?}");
     }
     // a record that starts with the pulse contains all of it
     let [force, v, _] = hann_hit(10_240.0, n, 0.0, 1.5e-3, 200.0);
-    assert_eq!(judged(10_240.0, &force, &[v]).kind, Kind::Good);
+    assert_eq!(judged(10_240.0, &force, &[v]).kind, Verdict::Good);
 }
 
 #[test]
@@ -291,7 +291,7 @@ fn a_force_of_the_wrong_sign_is_named() {
         }
         let found = judged(10_240.0, &force, &[v]);
         assert!(
-            found.kind == Kind::Mistimed && found.sentence.contains("sign is the wrong way round"),
+            found.kind == Verdict::Mistimed && found.sentence.contains("sign is the wrong way round"),
             "{found:?}"
         );
         assert!(found.sentence.contains("peak -2"), "{found:?}");
@@ -307,7 +307,7 @@ fn hits_in_one_row_are_counted_and_a_bounce_is_a_double_hit() {
         row.iter_mut().zip(force).for_each(|(sum, f)| *sum += f);
     }
     let found = judged(fs_hz, &row, &[]);
-    assert_eq!(found.kind, Kind::DoubleHit);
+    assert_eq!(found.kind, Verdict::DoubleHit);
     assert!(
         found.sentence.contains("holds 3 hits, at 0.30") && found.sentence.contains("cut it"),
         "{found:?}"
@@ -317,7 +317,7 @@ fn hits_in_one_row_are_counted_and_a_bounce_is_a_double_hit() {
         let [second, ..] = hann_hit(fs_hz, n, 0.3 + after_s, 1.6e-3, 200.0);
         force.iter_mut().zip(second).for_each(|(sum, f)| *sum += 0.6 * f);
         let found = judged(fs_hz, &force, &[]);
-        assert!(found.kind == Kind::DoubleHit && found.sentence.contains("second pulse"), "{found:?}");
+        assert!(found.kind == Verdict::DoubleHit && found.sentence.contains("second pulse"), "{found:?}");
     }
 }
 
@@ -331,7 +331,7 @@ fn a_soft_pulse_is_one_hit_at_any_rate() {
             for noise in [0.0, 1e-3] {
                 let force: Vec<f64> = force.iter().map(|f| f + 25.0 * noise * dice.gauss()).collect();
                 let found = judged(fs_hz, &force, std::slice::from_ref(&v));
-                assert_eq!(found.kind, Kind::Good, "{fs_hz} Hz, {width_s} s: {found:?}");
+                assert_eq!(found.kind, Verdict::Good, "{fs_hz} Hz, {width_s} s: {found:?}");
             }
         }
     }

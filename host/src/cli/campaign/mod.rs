@@ -12,7 +12,7 @@ use super::plan::file as plan_file;
 use crate::advice::quoted;
 use crate::campaign::plan;
 use crate::campaign::store::Store;
-use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::Verdict;
 use crate::outside::tell_line;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -108,22 +108,22 @@ pub struct Overrule {
 impl Overrule {
     /// Excludes the records from the analysis; `campaign run` then measures the missing hits.
     pub fn drop(self) -> Result<(), CliError> {
-        self.overrule(Kind::Dropped, "a person dropped it")
+        self.overrule(Verdict::Dropped, "a person dropped it")
     }
 
     /// Includes the records in the analysis.
     pub fn keep(self) -> Result<(), CliError> {
-        self.overrule(Kind::Good, "a person kept it")
+        self.overrule(Verdict::Good, "a person kept it")
     }
 
-    fn overrule(self, verdict: Kind, otherwise: &str) -> Result<(), CliError> {
+    fn overrule(self, verdict: Verdict, otherwise: &str) -> Result<(), CliError> {
         let store = Store::open(&self.file)?;
         let reason = self.reason.as_deref().unwrap_or(otherwise);
         let mut said = Vec::new();
         // all or none: a wrong number must not leave the command half done
         for id in &self.records {
             let record = store.record(*id)?;
-            if verdict == Kind::Good && record.scans == 0 {
+            if verdict == Verdict::Good && record.scans == 0 {
                 return Err(CliError::Bad(format!("record {id} has no samples: the bolt did not arrive")));
             }
             said.push(format!(

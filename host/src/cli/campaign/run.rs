@@ -11,7 +11,7 @@ use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::cli::campaign::calibrate;
 use crate::cli::error::CliError;
 use crate::cli::page::Page;
@@ -164,10 +164,10 @@ impl Judge for Ringing {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict {
+    ) -> Judgement {
         let verdict = ByRecord.judge(cell, plan, channels, recording, others);
         if self.rings {
-            let rings: &[u8] = if verdict.kind == Kind::Good { b"\x07" } else { b"\x07\x07" };
+            let rings: &[u8] = if verdict.kind == Verdict::Good { b"\x07" } else { b"\x07\x07" };
             // errors on stderr are ignored
             let _ = std::io::stderr().write_all(rings);
         }

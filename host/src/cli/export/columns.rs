@@ -57,7 +57,7 @@ pub(super) struct Columns<'a> {
 }
 
 /// Records that share a file.
-struct Part<'a> {
+struct RecordPart<'a> {
     /// Path relative to the export's folder.
     file: String,
     configuration: &'static str,
@@ -135,7 +135,7 @@ impl Columns<'_> {
         store: &Store,
         rows: &'r [RecordRow],
         maps: &'r BTreeMap<i64, ChannelMap>,
-    ) -> Result<Vec<Part<'r>>, CliError> {
+    ) -> Result<Vec<RecordPart<'r>>, CliError> {
         let cells: BTreeMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
         let mut together: BTreeMap<(&'static str, Vec<&str>), Vec<Sampled<'_>>> = BTreeMap::new();
         for row in rows.iter().filter(|row| self.what.counts(row)) {
@@ -151,7 +151,7 @@ impl Columns<'_> {
             for records in records.chunks(RECORDS_A_FILE) {
                 let number = count.entry(configuration).or_default();
                 let file = format!("samples/configuration={configuration}/part-{number:04}.parquet");
-                parts.push(Part {
+                parts.push(RecordPart {
                     file,
                     configuration,
                     channels: channels.clone(),
@@ -163,18 +163,18 @@ impl Columns<'_> {
         Ok(parts)
     }
 
-    fn write_samples(&self, parts: &[Part<'_>]) -> Result<Vec<(String, Written)>, CliError> {
+    fn write_samples(&self, parts: &[RecordPart<'_>]) -> Result<Vec<(String, Written)>, CliError> {
         for part in parts {
             make_folder(&self.what.out.join(format!("samples/configuration={}", part.configuration)))?;
         }
         let (waiting, done) = (Waiting::of("writing samples, by record"), AtomicUsize::new(0));
         let all = parts.iter().map(|part| part.records.len()).sum();
         let tell = || waiting.at(done.fetch_add(1, Ordering::Relaxed) + 1, all);
-        let one = |part: &Part<'_>| Ok((part.file.clone(), self.write_part(part, &tell)?));
+        let one = |part: &RecordPart<'_>| Ok((part.file.clone(), self.write_part(part, &tell)?));
         parts.par_iter().map(one).collect()
     }
 
-    fn write_part(&self, part: &Part<'_>, tell: &dyn Fn()) -> Result<Written, CliError> {
+    fn write_part(&self, part: &RecordPart<'_>, tell: &dyn Fn()) -> Result<Written, CliError> {
         // connections cannot be shared between threads
         let store = Store::open_read_only(&self.what.file)?;
         let of_channel = if self.si { Stored::Single } else { Stored::Code };

@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use super::names::{Named, Source, from_folder, from_table};
-use super::records::{Brought, CellName, Origin, bring, length_notice};
+use super::names::{Named, NamedFile, from_folder, from_table};
+use super::records::{Brought, CellName, RecordSource, bring, length_notice};
 use super::{Frfs, bad, frfs};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::output::Waiting;
@@ -108,8 +108,8 @@ fn say(path: &Path, warnings: &[String]) {
 }
 
 /// Prints the verdict of a hit that is not good.
-fn say_refused(of: &str, hit: u32, verdict: &Verdict) {
-    if verdict.kind != Kind::Good {
+fn say_refused(of: &str, hit: u32, verdict: &Judgement) {
+    if verdict.kind != Verdict::Good {
         tell_line!("{of}: hit {hit}: {} ({})", verdict.kind, verdict.sentence);
     }
 }
@@ -118,11 +118,11 @@ fn say_refused(of: &str, hit: u32, verdict: &Verdict) {
 fn one(
     store: &mut Store,
     plan: &Plan,
-    source: &Source,
+    source: &NamedFile,
     wishes: &Wishes<'_>,
     taken: &mut Taken,
 ) -> Result<Option<Brought>, CliError> {
-    let Source { path, name, holds } = source;
+    let NamedFile { path, name, holds } = source;
     let Wishes { replace, units, .. } = *wishes;
     match holds {
         Named::Frfs(configuration) => {
@@ -135,7 +135,7 @@ fn one(
         Named::Cell { configuration, impact, response } => {
             let read = read_record_file(path, units).map_err(bad)?;
             say(path, &read.notes);
-            let origin = Origin::of(path, name)?;
+            let origin = RecordSource::of(path, name)?;
             let cell = CellName { configuration, impact, response };
             let brought = bring(store, &origin, &cell, read, replace, &mut |hit, verdict| {
                 say_refused(name, hit, verdict);
@@ -144,7 +144,7 @@ fn one(
             Ok(Some(brought))
         }
         Named::Labelled(configuration) => {
-            let origin = Origin::of(path, name)?;
+            let origin = RecordSource::of(path, name)?;
             let wrong = |what: String| bad(format!("{}: {what}", path.display()));
             let geometry = &plan.geometry;
             let is_known = |name: &str| {

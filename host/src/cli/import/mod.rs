@@ -16,7 +16,7 @@ use super::output;
 use crate::analyse;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
-use crate::campaign::verdict::Kind;
+use crate::campaign::verdict::Verdict;
 use crate::exchange::frf_npz::direction_arrays;
 use crate::exchange::{LabelledFrf, StatedUnits, read_frf_file, write_frf};
 use crate::frf::Frf;
@@ -157,7 +157,8 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
     let cells = store.cells()?;
     let own =
         |id: i64| cells.iter().any(|row| row.id == id && configuration_name(row.cell.configuration) == name);
-    let kept = store.records()?.iter().flatten().filter(|r| own(r.cell) && r.verdict == Kind::Good).count();
+    let kept =
+        store.records()?.iter().flatten().filter(|r| own(r.cell) && r.verdict == Verdict::Good).count();
     if kept > 0 {
         return Err(CliError::Bad(format!(
             "{into}: {name} has {kept} good hits of its own, which FRFs would stand beside: import into a campaign that has none there"

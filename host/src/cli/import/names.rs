@@ -24,7 +24,7 @@ pub(super) enum Named {
 }
 
 /// A file and its content.
-pub(super) struct Source {
+pub(super) struct NamedFile {
     pub(super) path: PathBuf,
     /// Name in the campaign file: the path inside the folder.
     pub(super) name: String,
@@ -34,7 +34,7 @@ pub(super) struct Source {
 /// A row of the table.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Row {
+struct NameRow {
     file: String,
     configuration: String,
     #[serde(default)]
@@ -47,7 +47,7 @@ struct Row {
 const ENDINGS: [&str; 4] = ["npz", "uff", "unv", "uf"];
 
 /// Every file named in the table.
-pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, CliError> {
+pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<NamedFile>, CliError> {
     let told = |error: csv::Error| {
         bad(format!(
             "{}: {error}; a table of names has the columns file, configuration, impact, response, the last two empty for FRFs and \
@@ -65,8 +65,8 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, Cli
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let mut sources = Vec::new();
-    for row in rows.deserialize::<Row>() {
-        let Row { file, configuration, impact, response } = row.map_err(told)?;
+    for row in rows.deserialize::<NameRow>() {
+        let NameRow { file, configuration, impact, response } = row.map_err(told)?;
         let path = folder.join(&file);
         if !path.is_file() {
             return Err(bad(format!("{}: there is no file {}", table.display(), path.display())));
@@ -81,7 +81,7 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<Source>, Cli
                 )));
             }
         };
-        sources.push(Source { path, name: file, holds });
+        sources.push(NamedFile { path, name: file, holds });
     }
     Ok(sources)
 }
@@ -95,7 +95,7 @@ pub(super) fn from_folder(
     folder: &Path,
     plan: &Plan,
     configuration: Option<&str>,
-) -> Result<(Vec<Source>, Vec<PathBuf>), CliError> {
+) -> Result<(Vec<NamedFile>, Vec<PathBuf>), CliError> {
     let (mut sources, mut left_out, mut unnamed) = (Vec::new(), Vec::new(), Vec::new());
     for path in files(folder)? {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -105,7 +105,7 @@ pub(super) fn from_folder(
         }
         let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
         match named(&path, folder, plan, configuration)? {
-            Some(holds) => sources.push(Source { path, name, holds }),
+            Some(holds) => sources.push(NamedFile { path, name, holds }),
             None => unnamed.push(name),
         }
     }

@@ -20,7 +20,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
-use crate::campaign::verdict::{Kind, Verdict};
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
@@ -40,14 +40,14 @@ pub(super) struct CellName<'n> {
 }
 
 /// Source of the records.
-pub(super) struct Origin {
+pub(super) struct RecordSource {
     /// Name of the file in the campaign file.
     name: String,
     /// Digest that identifies its content.
     digest: String,
 }
 
-impl Origin {
+impl RecordSource {
     pub(super) fn of(path: &Path, name: &str) -> Result<Self, CliError> {
         let failed = |source| CliError::Read { path: path.into(), doing: "reading a file to import", source };
         let (mut file, size) = foreign::open(path).map_err(failed)?;
@@ -106,7 +106,7 @@ pub(super) fn import(
     }
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-    let origin = Origin::of(file, &called)?;
+    let origin = RecordSource::of(file, &called)?;
     let Brought { hits, kept, already, map, taken, .. } =
         bring(&mut store, &origin, name, read, replace, &mut |hit, verdict| {
             tell_line!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
@@ -151,11 +151,11 @@ pub(super) fn length_notice(store: &Store) -> Result<Option<String>, CliError> {
 /// another file with this name exist and must not be replaced.
 pub(super) fn bring(
     store: &mut Store,
-    origin: &Origin,
+    origin: &RecordSource,
     name: &CellName<'_>,
     read: RecordFile,
     replace: bool,
-    tell: &mut dyn FnMut(u32, &Verdict),
+    tell: &mut dyn FnMut(u32, &Judgement),
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
     let (id, cell, attempt) = find(store, name)?;
@@ -196,7 +196,7 @@ pub(super) fn bring(
     for (hit, of_scale, recording) in recordings {
         let (hit, map) = (hit as u32, &groups[of_scale].map);
         let verdict = ByRecord.judge(&cell, &plan, map, &recording, &others);
-        if verdict.kind == Kind::Good {
+        if verdict.kind == Verdict::Good {
             others.learn(&plan, map, recording.view());
             brought.kept += 1;
             brought.map = Some(map.clone());
@@ -254,7 +254,12 @@ fn put_in_step(map: &mut ChannelMap, delay_s: &[f64]) {
 
 /// The hits of exactly this file that the cell contains; those of another file with the same name
 /// are dropped, or refused.
-fn already_there(store: &Store, origin: &Origin, cell: i64, replace: bool) -> Result<Vec<u32>, CliError> {
+fn already_there(
+    store: &Store,
+    origin: &RecordSource,
+    cell: i64,
+    replace: bool,
+) -> Result<Vec<u32>, CliError> {
     let sessions = store.sessions()?;
     let imported = |row: &RecordRow| {
         let own = sessions.iter().find(|(id, _)| *id == row.session).map(|(_, info)| info);
@@ -278,7 +283,11 @@ fn already_there(store: &Store, origin: &Origin, cell: i64, replace: bool) -> Re
         )));
     }
     for record in older {
-        store.overrule(record, Kind::Dropped, &format!("replaced by {} ({})", origin.name, origin.digest))?;
+        store.overrule(
+            record,
+            Verdict::Dropped,
+            &format!("replaced by {} ({})", origin.name, origin.digest),
+        )?;
     }
     Ok(same)
 }
@@ -307,7 +316,7 @@ fn find(store: &Store, name: &CellName<'_>) -> Result<(i64, Cell, u32), CliError
     Ok((row.id, row.cell, attempts.unwrap_or(0)))
 }
 
-fn session(origin: &Origin) -> SessionInfo {
+fn session(origin: &RecordSource) -> SessionInfo {
     SessionInfo {
         address: origin.address(),
         board: SessionInfo::IMPORTED.into(),

@@ -17,7 +17,7 @@ use crate::structure::Structure;
 /// List all errors of a plan and the results that it yields, and draw the positions of hammer and
 /// vibrometer.
 #[derive(Debug, Args)]
-pub struct Check {
+pub struct PlanCheck {
     /// The plan.
     #[arg(value_name = "PLAN.toml")]
     file: PathBuf,
@@ -29,7 +29,7 @@ pub struct Check {
     no_picture: bool,
 }
 
-impl Check {
+impl PlanCheck {
     pub fn run(self) -> Result<(), CliError> {
         let text = file::read(&self.file)?;
         let plan = Plan::parse_all(&text, &self.file.display().to_string()).map_err(|all| refused(&all))?;

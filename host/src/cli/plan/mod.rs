@@ -18,23 +18,23 @@ pub mod file;
 #[derive(Debug, Args)]
 pub struct Plan {
     #[command(subcommand)]
-    command: Command,
+    command: PlanCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum PlanCommand {
     /// Write a plan from a template.
     New(New),
     /// List all errors of a plan and the results that it yields, and draw the positions of hammer
     /// and vibrometer.
-    Check(check::Check),
+    Check(check::PlanCheck),
 }
 
 impl Plan {
     pub fn run(self) -> Result<(), CliError> {
         match self.command {
-            Command::New(command) => command.run(),
-            Command::Check(command) => command.run(),
+            PlanCommand::New(command) => command.run(),
+            PlanCommand::Check(command) => command.run(),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::report::words::number::{decimals, micro, short, stiffness};
 use crate::results::{Excitation, Force, HIDDEN_RESONANCE, Hysteresis, Results, Shape};
 use crate::substructuring::Dof;
 
-struct Row {
+struct AnswerRow {
     label: String,
     role: Role,
     mean: f64,
@@ -66,7 +66,7 @@ pub fn answer(results: &Results) -> Option<Figure> {
     Some(Figure::new("answer", "", "What was found, on one axis", say).across(2).with(panel))
 }
 
-fn rows(results: &Results) -> Vec<Row> {
+fn rows(results: &Results) -> Vec<AnswerRow> {
     let mut rows = Vec::new();
     if let Some(answer) = &results.answer {
         let truth = answer.truth.as_ref();
@@ -94,7 +94,7 @@ fn rows(results: &Results) -> Vec<Row> {
             ),
         ];
         let known = found.into_iter().filter_map(|(what, role, k, truth, path)| {
-            Some(Row { truth: truth.map(micro), ..estimated(what, role, k?, path) })
+            Some(AnswerRow { truth: truth.map(micro), ..estimated(what, role, k?, path) })
         });
         rows.extend(known);
     }
@@ -107,9 +107,9 @@ fn rows(results: &Results) -> Vec<Row> {
 }
 
 /// An estimate with its interval: `between the arms: 26.9 N/µm (25.4…28.4)`.
-fn estimated(what: &str, role: Role, k: Interval, path: &str) -> Row {
+fn estimated(what: &str, role: Role, k: Interval, path: &str) -> AnswerRow {
     let [mean, low, high] = [k.mean, k.ci95[0], k.ci95[1]].map(|k| short(micro(k)));
-    Row {
+    AnswerRow {
         label: format!("{what}: {mean} N/µm ({low}…{high})"),
         role,
         mean: micro(k.mean),
@@ -121,16 +121,16 @@ fn estimated(what: &str, role: Role, k: Interval, path: &str) -> Row {
     }
 }
 
-fn quoted(results: &Results) -> Option<Row> {
+fn quoted(results: &Results) -> Option<AnswerRow> {
     let z = results.quoted()?.joint.get(&Dof::Z).filter(|z| z.identified)?;
     let k = Interval { mean: z.stiffness, ci95: z.ci95 };
     Some(estimated("between the arms", Role::BetweenArms, k, "/recommended/*/joint/z/stiffness"))
 }
 
-fn headline(results: &Results) -> Option<Row> {
+fn headline(results: &Results) -> Option<AnswerRow> {
     let joint = results.headline_joint()?;
     let k = joint.sliding_stiffness()?;
-    Some(Row {
+    Some(AnswerRow {
         label: format!("between the arms, {}: {}", joint.method, stiffness(k.mean, k.std)),
         role: Role::BetweenArms,
         mean: micro(k.mean),
@@ -143,7 +143,7 @@ fn headline(results: &Results) -> Option<Row> {
 }
 
 /// The range of the levels' straight loops from the softest to the stiffest.
-fn levels(results: &Results) -> Option<Row> {
+fn levels(results: &Results) -> Option<AnswerRow> {
     let straight = |h: &&Hysteresis| h.kind == Excitation::Shaker && h.force == Force::Raw;
     let slipping = |h: &Hysteresis| matches!(h.shape, Shape::Microslip | Shape::GrossSlip);
     let rows = || results.hysteresis.iter().filter(straight);
@@ -152,7 +152,7 @@ fn levels(results: &Results) -> Option<Row> {
     found.sort_by(f64::total_cmp);
     let (low, high) = (*found.first()?, *found.last()?);
     let campaign = results.source.kind == "campaign";
-    Some(Row {
+    Some(AnswerRow {
         label: if found.len() == 1 {
             format!("the shaker's loop: {} N/µm", short(low))
         } else {
@@ -170,11 +170,11 @@ fn levels(results: &Results) -> Option<Row> {
     })
 }
 
-fn impacts(results: &Results) -> Option<Row> {
+fn impacts(results: &Results) -> Option<AnswerRow> {
     let k = results.impact_loops()?.k_eq_n_per_m?;
     let hidden = results.check(HIDDEN_RESONANCE).filter(|c| c.ok == Some(false)).and_then(|c| c.frequency_hz);
     let beside = hidden.map_or(String::new(), |f| format!(", with {} Hz", decimals(f, 0)));
-    Some(Row {
+    Some(AnswerRow {
         label: format!("impacts, first cycle: {}{beside}", stiffness(k.mean, k.std)),
         role: Role::Loops,
         mean: micro(k.mean),

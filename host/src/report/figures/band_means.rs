@@ -23,7 +23,7 @@ pub fn band_means(results: &Results) -> Option<Figure> {
     (!figure.panels.is_empty()).then_some(figure)
 }
 
-struct Row {
+struct BandRow {
     name: String,
     idms: usize,
     mean: f64,
@@ -36,7 +36,7 @@ struct Row {
 
 fn panel(results: &Results, frequency_hz: &[f64], range: Band) -> Option<Panel> {
     let curves = &results.joint_spectrum.as_ref()?.curves;
-    let rows: Vec<Row> = (results.joint.iter().enumerate().filter(|(_, j)| j.band_hz == range))
+    let rows: Vec<BandRow> = (results.joint.iter().enumerate().filter(|(_, j)| j.band_hz == range))
         .filter_map(|(index, joint)| {
             let k = joint.sliding_stiffness()?;
             let (line, curve) = (curves.iter().enumerate())
@@ -45,7 +45,7 @@ fn panel(results: &Results, frequency_hz: &[f64], range: Band) -> Option<Panel> 
                 let lines = frequency_hz.iter().zip(&curve.stiffness_n_per_m);
                 lines.filter(|(f, _)| range.contains(**f)).filter_map(|(_, k)| k.map(micro))
             };
-            Some(Row {
+            Some(BandRow {
                 name: format!("{} {}", joint.method, joint.idms),
                 idms: joint.idms,
                 mean: micro(k.mean),

@@ -6,7 +6,7 @@ use crate::report::words::number::{micro, stiffness};
 use crate::results::{DIRECT, Joint, MAIN_BAND, Results};
 use crate::substructuring::Dof;
 
-struct Row {
+struct ComparedRow {
     label: String,
     mean: f64,
     std: f64,
@@ -20,7 +20,7 @@ struct Row {
 /// Mean and scatter of k_z over the main band, by method: of the methods that identified it, or of
 /// all if none did.
 pub fn comparison(results: &Results) -> Option<Figure> {
-    let mut rows: Vec<Row> = quoted(results).into_iter().collect();
+    let mut rows: Vec<ComparedRow> = quoted(results).into_iter().collect();
     let of_band = |j: &Joint| j.band_hz == MAIN_BAND || j.method == DIRECT;
     rows.extend(results.joint.iter().enumerate().filter(|(_, j)| of_band(j)).filter_map(|(i, j)| row(i, j)));
     let all = rows.len();
@@ -54,7 +54,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
 /// With more rows than this, a single column is too long.
 const TALLEST: usize = 10;
 
-fn panel(rows: &[Row], range: [f64; 2]) -> Panel {
+fn panel(rows: &[ComparedRow], range: [f64; 2]) -> Panel {
     let names = rows.iter().map(|r| r.label.clone()).collect();
     let x = Axis::linear("k_z", "N/µm", range).linked("every-method");
     let mut panel = Panel::new(x, Axis::named("", names)).high(Height::Rows);
@@ -82,10 +82,10 @@ fn panel(rows: &[Row], range: [f64; 2]) -> Panel {
     panel
 }
 
-fn row(index: usize, joint: &Joint) -> Option<Row> {
+fn row(index: usize, joint: &Joint) -> Option<ComparedRow> {
     let k = joint.sliding_stiffness()?;
     let modes = if joint.idms == 0 { String::new() } else { format!(", {} IDMs", joint.idms) };
-    Some(Row {
+    Some(ComparedRow {
         label: format!("{}{modes}: {}", joint.method, stiffness(k.mean, k.std)),
         mean: micro(k.mean),
         std: micro(k.std),
@@ -98,10 +98,10 @@ fn row(index: usize, joint: &Joint) -> Option<Row> {
 }
 
 /// The estimate to quote, which is not a row of any method.
-fn quoted(results: &Results) -> Option<Row> {
+fn quoted(results: &Results) -> Option<ComparedRow> {
     let estimate = results.quoted()?;
     let z = estimate.joint.get(&Dof::Z).filter(|z| z.identified)?;
-    Some(Row {
+    Some(ComparedRow {
         label: format!("recommended, {} IDMs: {}", estimate.idms, stiffness(z.stiffness, z.std)),
         mean: micro(z.stiffness),
         std: micro(z.std),

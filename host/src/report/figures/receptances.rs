@@ -38,14 +38,14 @@ pub fn receptances(results: &Results) -> Option<Figure> {
     )
     .across(configurations.len());
     let heard = indexed().any(|(_, c)| !c.coherence.is_empty());
-    for kind in [Kind::Magnitude, Kind::Phase, Kind::Coherence] {
-        if kind == Kind::Coherence && !heard {
+    for kind in [CurveKind::Magnitude, CurveKind::Phase, CurveKind::Coherence] {
+        if kind == CurveKind::Coherence && !heard {
             continue;
         }
         for name in &configurations {
             let x = Axis::frequency(Spread::Log, frequencies);
             let mut panel = Panel::new(x, kind.axis(magnitudes)).high(kind.height());
-            if kind == Kind::Magnitude {
+            if kind == CurveKind::Magnitude {
                 panel.title = title(name).into();
             } else {
                 panel = panel.named_above();
@@ -78,32 +78,32 @@ fn last_hz(curve: &FrfCurve) -> f64 {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum CurveKind {
     Magnitude,
     Phase,
     Coherence,
 }
 
-impl Kind {
+impl CurveKind {
     fn height(self) -> Height {
-        if self == Kind::Magnitude { Height::Usual } else { Height::Low }
+        if self == CurveKind::Magnitude { Height::Usual } else { Height::Low }
     }
 
     fn axis(self, magnitudes: [f64; 2]) -> Axis {
         match self {
-            Kind::Magnitude => Axis::log("receptance", "m/N", magnitudes),
-            Kind::Phase => Axis::linear("phase", "°", [-190.0, 190.0]).every(90.0),
-            Kind::Coherence => Axis::linear("coherence", "", [0.0, 1.05]),
+            CurveKind::Magnitude => Axis::log("receptance", "m/N", magnitudes),
+            CurveKind::Phase => Axis::linear("phase", "°", [-190.0, 190.0]).every(90.0),
+            CurveKind::Coherence => Axis::linear("coherence", "", [0.0, 1.05]),
         }
     }
 }
 
-fn line(curve: &FrfCurve, index: usize, kind: Kind) -> Option<Mark> {
+fn line(curve: &FrfCurve, index: usize, kind: CurveKind) -> Option<Mark> {
     let role = if curve.role == Shows::DrivingPoint { Role::Group1 } else { Role::Group2 };
     let (values, field) = match kind {
-        Kind::Magnitude => (curve.magnitude_m_per_n.clone(), "magnitude_m_per_n"),
-        Kind::Phase => (unbroken(&curve.phase_deg), "phase_deg"),
-        Kind::Coherence => (curve.coherence.clone(), "coherence"),
+        CurveKind::Magnitude => (curve.magnitude_m_per_n.clone(), "magnitude_m_per_n"),
+        CurveKind::Phase => (unbroken(&curve.phase_deg), "phase_deg"),
+        CurveKind::Coherence => (curve.coherence.clone(), "coherence"),
     };
     let mark = Mark::line(role, along(curve, values.len()), values).from(
         "y",

@@ -3,11 +3,11 @@
 //! The marker of a single point.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::scene::Place;
+use super::scene::PanelFrame;
 use crate::report::figure::{Along, Bars, Mark, Marker, Packed, Role, Shape};
 
 /// Draws one mark; the caller clips what lies outside the frame.
-pub fn draw(drawing: &mut Drawing, place: &Place, mark: &Mark) {
+pub fn draw(drawing: &mut Drawing, place: &PanelFrame, mark: &Mark) {
     let role = mark.role;
     let class = format!("s-{}", role.name());
     let fill = format!("f-{}", role.name());
@@ -85,7 +85,7 @@ fn swarm(drawing: &mut Drawing, at: &[[f64; 2]], class: &str, marker: Marker) {
 }
 
 /// A word that starts at `at`, or ends there if it would leave the frame.
-fn word(drawing: &mut Drawing, place: &Place, at: [f64; 2], text: &str) {
+fn word(drawing: &mut Drawing, place: &PanelFrame, at: [f64; 2], text: &str) {
     let width = 6.6 * text.chars().count() as f64;
     let (x, anchor) =
         if at[0] + width > place.area.right() { (at[0] - 26.0, Anchor::End) } else { (at[0], Anchor::Start) };
@@ -96,7 +96,7 @@ fn word(drawing: &mut Drawing, place: &Place, at: [f64; 2], text: &str) {
 /// from such values would look like a hatched area.
 const BEYOND: f64 = 0.5;
 
-fn points(place: &Place, x: &Along, y: &Packed) -> Vec<Option<[f64; 2]>> {
+fn points(place: &PanelFrame, x: &Along, y: &Packed) -> Vec<Option<[f64; 2]>> {
     let area = place.area;
     let far = BEYOND * area.height;
     let near = |y: &f64| (area.top - far..=area.bottom() + far).contains(y);
@@ -105,13 +105,13 @@ fn points(place: &Place, x: &Along, y: &Packed) -> Vec<Option<[f64; 2]>> {
     y.0.iter().enumerate().map(of).collect()
 }
 
-fn inside(place: &Place, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+fn inside(place: &PanelFrame, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
     Some([place.x.place(x)?, place.y.place(y)?])
 }
 
 fn ribbon(
     drawing: &mut Drawing,
-    place: &Place,
+    place: &PanelFrame,
     [fill, _]: [&str; 2],
     x: &Along,
     ends: [&Packed; 2],
@@ -130,7 +130,7 @@ fn ribbon(
 /// An error bar with caps; an end beyond the frame is drawn as an arrow at the frame.
 fn bar(
     drawing: &mut Drawing,
-    place: &Place,
+    place: &PanelFrame,
     bars: &Bars,
     i: usize,
     at: [f64; 2],
@@ -159,7 +159,7 @@ fn bar(
     }
 }
 
-fn cells(drawing: &mut Drawing, place: &Place, fill: &str, values: &Packed) {
+fn cells(drawing: &mut Drawing, place: &PanelFrame, fill: &str, values: &Packed) {
     let [left, right] = place.x.range();
     let columns = (right - left).round() as usize;
     for (i, value) in values.0.iter().enumerate().filter(|(_, v)| v.is_finite()) {
@@ -180,7 +180,7 @@ fn strength(value: f32) -> Option<f64> {
     STEPS.iter().find(|(below, _)| value < *below).map(|(_, strength)| *strength)
 }
 
-fn strips(drawing: &mut Drawing, place: &Place, fill: &str, x: &Packed, values: &Packed) {
+fn strips(drawing: &mut Drawing, place: &PanelFrame, fill: &str, x: &Packed, values: &Packed) {
     let columns = x.0.len();
     let edge = |i: usize| place.x.place_within(f64::from(x.0[i.min(columns - 1)]));
     // all runs of the same opacity are one shape

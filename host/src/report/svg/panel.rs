@@ -1,7 +1,7 @@
 //! One panel as a drawing: frame, grid, ticks, and contents.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::scene::Place;
+use super::scene::PanelFrame;
 use super::{marks, scene};
 use crate::report::figure::{Axis, Height, Panel, Shape};
 use crate::report::scale::{Lie, Scale, Tick};
@@ -54,8 +54,11 @@ pub fn drawing(panel: &Panel, name: &str, width: f64) -> Drawing {
     }
     let upright =
         if panel.y.names.is_empty() { [area.bottom(), area.top] } else { [area.top, area.bottom()] };
-    let place =
-        Place { area, x: Scale::of(&panel.x, [area.left, area.right()]), y: Scale::of(&panel.y, upright) };
+    let place = PanelFrame {
+        area,
+        x: Scale::of(&panel.x, [area.left, area.right()]),
+        y: Scale::of(&panel.y, upright),
+    };
     let (x_ticks, y_ticks) = (ticks(&panel.x, &place.x, Lie::Across), ticks(&panel.y, &place.y, Lie::Up));
     drawing.fill(area, "paper", 1.0);
     grid(&mut drawing, panel, &place, &x_ticks, &y_ticks);
@@ -85,7 +88,7 @@ fn ticks(axis: &Axis, scale: &Scale, lie: Lie) -> Vec<Tick> {
     }
 }
 
-fn grid(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y_ticks: &[Tick]) {
+fn grid(drawing: &mut Drawing, panel: &Panel, place: &PanelFrame, x_ticks: &[Tick], y_ticks: &[Tick]) {
     let area = place.area;
     let stroke = |tick: &Tick| if tick.label.is_empty() { MINOR } else { GRID };
     if panel.x.names.is_empty() {
@@ -100,7 +103,7 @@ fn grid(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y
     }
 }
 
-fn axes(drawing: &mut Drawing, panel: &Panel, place: &Place, x_ticks: &[Tick], y_ticks: &[Tick]) {
+fn axes(drawing: &mut Drawing, panel: &Panel, place: &PanelFrame, x_ticks: &[Tick], y_ticks: &[Tick]) {
     let (left, right, top, bottom) =
         (place.area.left, place.area.right(), place.area.top, place.area.bottom());
     for (from, to) in [

@@ -102,7 +102,7 @@ fn corners_of(body: &Body) -> [[f64; 3]; 8] {
 }
 
 /// A panel with its frame and axes in pixels.
-pub struct Place {
+pub struct PanelFrame {
     /// The frame.
     pub area: Area,
     /// The horizontal axis.

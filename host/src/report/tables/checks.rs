@@ -3,7 +3,7 @@
 //!
 //! Quality of the virtual points.
 
-use super::{Table, key, number, words};
+use super::{HtmlTable, key, number, words};
 use crate::report::page::escaped;
 use crate::report::words;
 use crate::report::words::number::{count, decimals, short};
@@ -93,7 +93,7 @@ pub fn virtual_points(results: &Results) -> Option<String> {
         "passive lines",
         "reciprocity",
     ];
-    let mut table = Table::new(1, "Quality of the virtual points", &heads);
+    let mut table = HtmlTable::new(1, "Quality of the virtual points", &heads);
     for (i, point) in results.virtual_points.iter().enumerate() {
         let at = |field: &str| format!("/virtual_points/{i}/{field}");
         let least = |all: &BTreeMap<String, f64>, field: &str| {

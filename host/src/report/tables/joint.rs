@@ -1,7 +1,7 @@
 //! Joint stiffness and damping by method, IDM set and band, in a collapsible section; rows that
 //! failed come last, each with a short reason.
 
-use super::{Cell, Table, interval, kind_of, number, remarks, scattered, words};
+use super::{HtmlTable, TableCell, interval, kind_of, number, remarks, scattered, words};
 use crate::report::page::escaped;
 use crate::report::words::number::{band, micro, short, with_scatter};
 use crate::results::{Joint, MAIN_BAND, Results};
@@ -38,7 +38,8 @@ pub fn joint(results: &Results) -> Option<String> {
             results.joint.iter().enumerate().filter(|(_, j)| j.band_hz == range).collect();
         rows.sort_by_key(|(_, j)| verdict(j).is_some());
         let lines = rows.iter().map(|(_, j)| j.lines).max().unwrap_or(0);
-        let mut table = Table::new(2, &format!("Joint by method, {}, {lines} lines", band(range)), &HEADS);
+        let mut table =
+            HtmlTable::new(2, &format!("Joint by method, {}, {lines} lines", band(range)), &HEADS);
         for (i, joint) in &rows {
             table.row(row(*i, joint));
         }
@@ -54,7 +55,7 @@ pub fn joint(results: &Results) -> Option<String> {
     Some(html)
 }
 
-fn row(i: usize, joint: &Joint) -> Vec<Cell> {
+fn row(i: usize, joint: &Joint) -> Vec<TableCell> {
     let k = joint.sliding_stiffness();
     let over = |s: Option<&crate::results::Statistics>, scale: f64, path: String| {
         scattered(s.map(|s| with_scatter(s.mean * scale, s.std * scale)), &path)

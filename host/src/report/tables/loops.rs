@@ -1,7 +1,7 @@
 //! The contact by loops in numbers: types of stiffness side by side (the paper's Tables 2 and 3),
 //! the cycles of the decay, all levels.
 
-use super::{Table, number, remarks, scattered, words};
+use super::{HtmlTable, number, remarks, scattered, words};
 use crate::report::page::escaped;
 use crate::report::words as said;
 use crate::report::words::number::{decimals, micro, short, with_scatter};
@@ -43,7 +43,8 @@ pub fn decay(results: &Results) -> Option<String> {
     }
     let heads =
         ["cycle after the hit", "what it tells", "k_eq ± σ over hits, N/µm", "Δx lags T, °", "Δx, µm"];
-    let mut table = Table::new(2, "The decay's cycles over all hits (the paper's Table 3, impacts)", &heads);
+    let mut table =
+        HtmlTable::new(2, "The decay's cycles over all hits (the paper's Table 3, impacts)", &heads);
     for (i, step) in steps.iter().enumerate() {
         let k = step.k_eq_n_per_m;
         let at = |field: &str| format!("/hysteresis/{row}/decay/{i}/{field}");
@@ -96,8 +97,8 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     if friction {
         heads.push("μ");
     }
-    let mut table = Table::new(2, "Loops with the raw force (the paper's Table 3)", &heads);
-    let mut corrected = Table::new(2, "Loops with the corrected force", &heads);
+    let mut table = HtmlTable::new(2, "Loops with the raw force (the paper's Table 3)", &heads);
+    let mut corrected = HtmlTable::new(2, "Loops with the corrected force", &heads);
     let mut any_corrected = false;
     let over =
         |value: Option<OverCycles>, scale: f64| value.map(|v| with_scatter(v.mean * scale, v.std * scale));

@@ -26,31 +26,31 @@ pub(super) const UNKNOWN: &str = "–";
 /// One cell: words, or a number with its path in `results.json`; for several numbers, the paths in
 /// order, separated by spaces.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Cell {
+pub(super) struct TableCell {
     text: String,
     path: String,
 }
 
 /// A cell with words.
-pub(super) fn words(text: impl Into<String>) -> Cell {
-    Cell { text: text.into(), path: String::new() }
+pub(super) fn words(text: impl Into<String>) -> TableCell {
+    TableCell { text: text.into(), path: String::new() }
 }
 
 /// A number, or a dash if it is not known.
-pub(super) fn number(text: Option<String>, path: impl Into<String>) -> Cell {
+pub(super) fn number(text: Option<String>, path: impl Into<String>) -> TableCell {
     match text {
-        Some(text) => Cell { text, path: path.into() },
+        Some(text) => TableCell { text, path: path.into() },
         None => words(UNKNOWN),
     }
 }
 
 /// A number with its scatter; both are in the object at `place`.
-pub(super) fn scattered(text: Option<String>, place: &str) -> Cell {
+pub(super) fn scattered(text: Option<String>, place: &str) -> TableCell {
     number(text, format!("{place}/mean {place}/std"))
 }
 
 /// An interval at `place`.
-pub(super) fn interval(text: Option<String>, place: &str) -> Cell {
+pub(super) fn interval(text: Option<String>, place: &str) -> TableCell {
     number(text, format!("{place}/0 {place}/1"))
 }
 
@@ -60,12 +60,12 @@ pub(super) fn key(name: &str) -> String {
 }
 
 /// Builds one table; cells are escaped, columns after the first `text_columns` are right-aligned.
-pub(super) struct Table {
+pub(super) struct HtmlTable {
     html: String,
     text_columns: usize,
 }
 
-impl Table {
+impl HtmlTable {
     pub(super) fn new(text_columns: usize, caption: &str, heads: &[&str]) -> Self {
         let mut html =
             format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", escaped(caption));
@@ -74,10 +74,10 @@ impl Table {
             let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", escaped(head));
         }
         html.push_str("</tr></thead><tbody>");
-        Table { html, text_columns }
+        HtmlTable { html, text_columns }
     }
 
-    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = TableCell>) {
         self.html.push_str("<tr>");
         for (i, cell) in cells.into_iter().enumerate() {
             let class = if i < self.text_columns { "" } else { " class=\"n\"" };
@@ -144,7 +144,7 @@ pub(super) fn kind_of(remark: &str) -> String {
 pub fn differences(compared: &Compared) -> String {
     let heads =
         ["quantity", "differ?", "first", "second", "second − first", "95 % interval", "of the first, %"];
-    let mut table = Table::new(2, "Differences", &heads);
+    let mut table = HtmlTable::new(2, "Differences", &heads);
     for (i, d) in compared.differences.iter().enumerate() {
         let (scale, unit) = if d.unit == "N/m" { (1e-6, "N/µm") } else { (1.0, "N s/m") };
         let at = |field: &str| format!("/differences/{i}/{field}");
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_number_says_where_it_stands() {
-        let mut table = Table::new(1, "c", &["a", "b"]);
+        let mut table = HtmlTable::new(1, "c", &["a", "b"]);
         table.row([words("<x>"), number(Some("26.8".into()), "/joint/0/x")]);
         table.row([words("y"), number(None, "/joint/1/x")]);
         let html = table.finish();

@@ -1,6 +1,6 @@
 //! What was measured, and the provenance of the results.
 
-use super::{Table, key, number, words};
+use super::{HtmlTable, key, number, words};
 use crate::report::page::escaped as escape;
 use crate::report::words::number::{count, decimals, short};
 use crate::results::Results;
@@ -21,7 +21,7 @@ pub fn completeness(results: &Results) -> Option<String> {
     let titles: Vec<String> = verdicts.iter().map(|v| format!("refused: {v}")).collect();
     let mut heads = vec!["configuration", "cells complete", "hits wanted", "kept"];
     heads.extend(titles.iter().map(String::as_str));
-    let mut table = Table::new(1, "Hits", &heads);
+    let mut table = HtmlTable::new(1, "Hits", &heads);
     for (i, c) in results.completeness.iter().enumerate() {
         let mut cells = vec![
             words(c.configuration.clone()),
@@ -62,8 +62,11 @@ pub fn calibrations(results: &Results) -> Option<String> {
         "ns since",
         "uncertainty",
     ];
-    let mut table =
-        Table::new(4, "Calibrations entered in the campaign file; the last one of a channel counts", &heads);
+    let mut table = HtmlTable::new(
+        4,
+        "Calibrations entered in the campaign file; the last one of a channel counts",
+        &heads,
+    );
     for (i, own) in all.iter().enumerate() {
         let at = |field: &str| format!("/source/calibrations/{i}/{field}");
         let volts = |n: usize| number(Some(precise(own.sensitivity_v[n])), at(&format!("sensitivity_v/{n}")));

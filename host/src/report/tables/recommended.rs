@@ -1,6 +1,6 @@
 //! The estimates to quote, with their intervals, and the result of the bootstrap over hits.
 
-use super::{Table, interval, number, words};
+use super::{HtmlTable, interval, number, words};
 use crate::report::page::escaped as escape;
 use crate::report::words as said;
 use crate::report::words::number::{band, short};
@@ -24,7 +24,7 @@ pub fn recommended(results: &Results) -> Option<String> {
         "C, N s/m or N m s/rad",
         "",
     ];
-    let mut table = Table::new(
+    let mut table = HtmlTable::new(
         1,
         "Recommended estimate between the arms: Eq. A.1, averaged as an admittance before it is inverted (the paper's Table 2 with intervals)",
         &heads,

@@ -1,7 +1,7 @@
 //! Names of methods, shapes, excitations and outcomes.
 
 use super::number::{decimals, short};
-use crate::hysteresis::static_arm::Basis;
+use crate::hysteresis::static_arm::CorrectionSource;
 use crate::results::{Excitation, Force, Hysteresis, Identified, OverCycles, Shape};
 
 /// Name of the slope between the measured points.
@@ -39,9 +39,9 @@ pub fn method(name: &str) -> &str {
 /// The parameters of the force correction, and how they were determined.
 pub fn static_arm(arm: &Identified) -> String {
     let basis = match arm.basis {
-        Basis::Given => "as stated",
-        Basis::Hits => "from hits on B alone",
-        Basis::Levels => "from stuck loops at several frequencies",
+        CorrectionSource::Given => "as stated",
+        CorrectionSource::Hits => "from hits on B alone",
+        CorrectionSource::Levels => "from stuck loops at several frequencies",
     };
     format!(
         "With the force at the contact, F = {} T + {} kg x\u{308}_B ({basis}):",

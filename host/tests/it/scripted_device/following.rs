@@ -12,7 +12,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::campaign::verdict::judge::Judge;
 use jointrig::campaign::verdict::others::Others;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::stream::Recording;
 use jointrig::live::bus::Bus;
@@ -45,7 +45,7 @@ impl Judge for Looks {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict {
+    ) -> Judgement {
         self.look();
         ByShotSummary.judge(cell, plan, channels, recording, others)
     }
@@ -79,7 +79,7 @@ fn what_is_told_bit_by_bit_is_the_whole() {
     // a verdict overruled afterwards, and the overruling undone
     let store = Store::open(&path).unwrap();
     let good = store.records().unwrap().into_iter().flatten().find(RecordRow::kept).unwrap();
-    for verdict in [Kind::Dropped, Kind::Good] {
+    for verdict in [Verdict::Dropped, Verdict::Good] {
         store.overrule(good.id, verdict, "test").unwrap();
         let before = whole(&looks.bus);
         looks.look();

@@ -13,7 +13,7 @@ use jointrig::campaign::run::runner::Options;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::verdict::judge::Judge;
 use jointrig::campaign::verdict::others::Others;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::campaign::watch::{Seen, Watch, Watchers};
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::stream::Recording;
@@ -84,10 +84,10 @@ impl Judge for Loses {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict {
+    ) -> Judgement {
         self.judged += 1;
         if self.lost.contains(&self.judged) {
-            return Verdict::without_pulse(Kind::Gap, 480.0, 0.0, "480 samples are missing".into());
+            return Judgement::without_pulse(Verdict::Gap, 480.0, 0.0, "480 samples are missing".into());
         }
         ByShotSummary.judge(cell, plan, channels, recording, others)
     }
@@ -99,7 +99,7 @@ fn a_record_with_missing_samples_does_not_change_the_pulse() {
     let path = create(&folder, "a.jrig", &plan());
     run_on(&path, Fake::default(), &options(), &mut Loses { judged: 0, lost: [4, 7] }).unwrap();
     let rows = rows(&Store::open_read_only(&path).unwrap());
-    let lost: Vec<usize> = (0..rows.len()).filter(|at| rows[*at].verdict == Kind::Gap).collect();
+    let lost: Vec<usize> = (0..rows.len()).filter(|at| rows[*at].verdict == Verdict::Gap).collect();
     assert_eq!(lost, [3, 6]);
     for at in lost {
         assert_eq!(rows[at].shot.pulse_us, rows[at + 1].shot.pulse_us, "hit {at}");

@@ -21,7 +21,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::campaign::verdict::judge::Judge;
 use jointrig::campaign::verdict::others::Others;
-use jointrig::campaign::verdict::{Kind, Verdict};
+use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::campaign::watch::Watchers;
 use jointrig::device::address::Transport;
 use jointrig::device::channels::ChannelMap;
@@ -75,7 +75,7 @@ pub fn rows(store: &Store) -> Vec<RecordRow> {
 }
 
 /// What two equal runs have in common: everything except absolute scans and times.
-pub fn content(path: &Path) -> Vec<(i64, u32, Kind, usize, u32, Vec<i16>)> {
+pub fn content(path: &Path) -> Vec<(i64, u32, Verdict, usize, u32, Vec<i16>)> {
     let store = Store::open_read_only(path).expect("opens");
     assert_eq!(store.verify().expect("checked"), []);
     let rows = self::rows(&store);
@@ -143,7 +143,7 @@ impl Judge for StopAfter {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict {
+    ) -> Judgement {
         self.0 = self.0.saturating_sub(1);
         if self.0 == 0 {
             self.1.store(true, Ordering::Relaxed);
@@ -190,7 +190,7 @@ impl Judge for DropsOne {
         channels: &ChannelMap,
         recording: &Recording,
         others: &Others,
-    ) -> Verdict {
+    ) -> Judgement {
         let store = Store::open_read_only(&self.path).unwrap();
         while store.places().unwrap().len() < self.judged {
             std::thread::sleep(Duration::from_millis(1));
@@ -201,7 +201,7 @@ impl Judge for DropsOne {
             && let Some(desk) = self.desk.take()
         {
             let good = rows(&store).into_iter().find(RecordRow::kept).unwrap();
-            let edit = Edit::Overrule { record: good.id, verdict: Kind::Dropped, reason: "test".into() };
+            let edit = Edit::Overrule { record: good.id, verdict: Verdict::Dropped, reason: "test".into() };
             let (tell, told) = channel();
             desk.hand_in(edit, move |outcome| tell.send(outcome).unwrap()).unwrap();
             told.recv().unwrap().unwrap();
@@ -324,7 +324,7 @@ fn a_bolt_that_does_not_arrive_is_weak_and_the_pulse_grows() {
     let summary = run_on(&path, fake, &options(), &mut ByShotSummary).expect("runs");
     assert_eq!(summary.kept, 14);
     let records = content(&path);
-    assert_eq!((records[0].2, records[0].5.len()), (Kind::Weak, 0));
+    assert_eq!((records[0].2, records[0].5.len()), (Verdict::Weak, 0));
     assert!(records[0].4 < records[1].4);
 }
 

@@ -4,12 +4,12 @@
 use super::Line;
 use crate::substructuring::geometry::{Geometry, Point};
 use crate::substructuring::idm::{Dof, IdmSet};
-use crate::substructuring::interface_data::{Found, VirtualPoint, balance};
+use crate::substructuring::interface_data::{Found, LocatedVirtualPoint, balance};
 use crate::substructuring::vpt::{reduce_inputs, reduce_outputs};
 use nalgebra::{DMatrix, Vector3};
 
 /// A channel or impact with the data that the propagation needs.
-pub(super) struct Place {
+pub(super) struct PlacedPoint {
     pub(super) direction: Vector3<f64>,
     pub(super) offset: Vector3<f64>,
     /// 0 for A's virtual point, 1 for B's.
@@ -23,8 +23,8 @@ pub(super) struct Layout {
     /// 2n_c × channels and impacts × 2n_c, rotations scaled.
     pub(super) t_u: DMatrix<f64>,
     pub(super) t_f: DMatrix<f64>,
-    pub(super) channels: Vec<Place>,
-    pub(super) impacts: Vec<Place>,
+    pub(super) channels: Vec<PlacedPoint>,
+    pub(super) impacts: Vec<PlacedPoint>,
     pub(super) points: usize,
     pub(super) translations: Axes,
     pub(super) rotations: Axes,
@@ -36,8 +36,8 @@ pub(super) type Axes = [Option<(usize, f64)>; 3];
 
 impl Layout {
     pub(super) fn new(
-        a: &VirtualPoint,
-        b: &VirtualPoint,
+        a: &LocatedVirtualPoint,
+        b: &LocatedVirtualPoint,
         rows: &Found,
         columns: &Found,
         geometry: &Geometry,
@@ -57,7 +57,7 @@ impl Layout {
             _ => 0.0,
         });
         let origins = [geometry.virtual_point_a_m, geometry.virtual_point_b_m].map(Vector3::from);
-        let place = |p: &Point, side: usize, point: usize| Place {
+        let place = |p: &Point, side: usize, point: usize| PlacedPoint {
             direction: p.direction(),
             offset: p.position() - origins[side],
             side,

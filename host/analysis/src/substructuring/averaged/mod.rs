@@ -40,7 +40,7 @@ use nalgebra::{Complex, DMatrix};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use sensitivity::Sums;
+use sensitivity::SensitivitySums;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -226,7 +226,7 @@ pub struct Prepared {
     /// Bias of the compliance due to noise \[degree of freedom\]\[line\].
     bias: Vec<Vec<Complex<f64>>>,
     /// Sensitivities \[degree of freedom\]\[line\].
-    sums: Vec<Vec<Sums>>,
+    sums: Vec<Vec<SensitivitySums>>,
     /// Normalised weights \[degree of freedom\]\[line\].
     weights: Vec<Vec<f64>>,
     /// Relative standard deviation at the typical compliance \[degree of freedom\].
@@ -261,9 +261,10 @@ impl Prepared {
             .collect::<Result<_, AveragedError>>()?;
         let by_line = noise_bias(&assembly, &impedance);
         let bias = (0..idms.count()).map(|d| by_line.iter().map(|line| line[d]).collect()).collect();
-        let by_line: Vec<Vec<Sums>> =
+        let by_line: Vec<Vec<SensitivitySums>> =
             (0..impedance.len()).into_par_iter().map(|l| assembly.sums(l, &impedance[l])).collect();
-        let mut sums: Vec<Vec<Sums>> = (0..idms.count()).map(|_| Vec::with_capacity(by_line.len())).collect();
+        let mut sums: Vec<Vec<SensitivitySums>> =
+            (0..idms.count()).map(|_| Vec::with_capacity(by_line.len())).collect();
         for line in by_line {
             sums.iter_mut().zip(line).for_each(|(sums, own)| sums.push(own));
         }
@@ -329,7 +330,7 @@ impl Prepared {
         }
         let s = self.mean_s(d);
         let (stiffness, damping) = stiffness_and_damping((y - drawn).inv(), s);
-        let total = Sums::weighted(&self.sums[d], self.weights[d].iter().copied());
+        let total = SensitivitySums::weighted(&self.sums[d], self.weights[d].iter().copied());
         // dK = −K² dy, to second order in the loss factor
         let to_stiffness = stiffness * stiffness;
         let enough = if self.idms.dofs()[d].is_rotation() { HIDDEN_ROTATION } else { HIDDEN };
@@ -387,7 +388,7 @@ impl DofEstimate {
 
 /// Normalised weights: inverse of each line's noise variance after averaging plus its variance due
 /// to geometry.
-fn weights(lines: &[Sums], shared: f64, priors: &Priors) -> Vec<f64> {
+fn weights(lines: &[SensitivitySums], shared: f64, priors: &Priors) -> Vec<f64> {
     let averaging = (lines.len() as f64 / shared).max(1.0);
     let raw: Vec<f64> = lines
         .iter()
@@ -450,9 +451,16 @@ impl Typical {
     /// The relative standard deviation of the lines' unweighted mean at the typical compliance,
     /// from the sensitivities of each line at its own compliance; infinite if noise decides the
     /// sign.
-    fn known(&self, lines: &[Sums], impedance: &[Line], d: usize, shared: f64, priors: &Priors) -> f64 {
+    fn known(
+        &self,
+        lines: &[SensitivitySums],
+        impedance: &[Line],
+        d: usize,
+        shared: f64,
+        priors: &Priors,
+    ) -> f64 {
         let there = impedance.iter().map(|z| self.instead_of(compliance(z, d)) / lines.len() as f64);
-        let total = Sums::weighted(lines, there);
+        let total = SensitivitySums::weighted(lines, there);
         let variance = total.noise_variance * shared + total.geometry_variance(priors);
         if self.pushing < PUSHING { f64::INFINITY } else { variance.sqrt() / self.joint }
     }

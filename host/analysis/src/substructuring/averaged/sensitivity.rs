@@ -18,7 +18,7 @@ type C = Complex<f64>;
 /// Weighted sums over lines: the sensitivities to errors common to all lines, and the variance of
 /// the noise.
 #[derive(Clone)]
-pub(super) struct Sums {
+pub(super) struct SensitivitySums {
     pub(super) noise_variance: f64,
     channel_position: Vec<Vector3<C>>,
     impact_position: Vec<Vector3<C>>,
@@ -28,9 +28,12 @@ pub(super) struct Sums {
     impact_aim: Vec<Vector3<C>>,
 }
 
-impl Sums {
+impl SensitivitySums {
     /// Σ w · line, in the lines' order; variances with w².
-    pub(super) fn weighted(lines: &[Sums], weights: impl IntoIterator<Item = f64>) -> Sums {
+    pub(super) fn weighted(
+        lines: &[SensitivitySums],
+        weights: impl IntoIterator<Item = f64>,
+    ) -> SensitivitySums {
         let mut total = lines[0].clone();
         total.noise_variance = 0.0;
         total.parts_mut().into_iter().flatten().for_each(|v| *v = Vector3::zeros());
@@ -78,13 +81,13 @@ impl Sums {
 impl Assembly {
     /// Sensitivities of the joint's compliance along every degree of freedom at line `l`, whose
     /// inverse admittance is `z`.
-    pub(super) fn sums(&self, l: usize, z: &Line) -> Vec<Sums> {
+    pub(super) fn sums(&self, l: usize, z: &Line) -> Vec<SensitivitySums> {
         let layout = &self.layout;
         let n = z.nrows() / 2;
         let cells = &self.cells[l];
         let impacts = layout.impacts.len();
         let zeros = |count| vec![Vector3::zeros(); count];
-        let none = Sums {
+        let none = SensitivitySums {
             noise_variance: 0.0,
             channel_position: zeros(layout.points),
             impact_position: zeros(impacts),

@@ -35,7 +35,7 @@ fn the_sensitivity_is_the_difference_quotient() {
     let one_metre = Priors { position_m: 1.0, ..NOWHERE_WRONG };
     let prepared = Prepared::of(&ajb, &geometry, IdmSet::Six, BAND, &NOWHERE_WRONG).expect("exact data");
     let propagated = |d: usize| {
-        let y = Sums::weighted(&prepared.sums[d], prepared.weights[d].iter().copied())
+        let y = SensitivitySums::weighted(&prepared.sums[d], prepared.weights[d].iter().copied())
             .geometry_variance(&one_metre)
             .sqrt();
         let k = prepared.estimate_of(d).stiffness;

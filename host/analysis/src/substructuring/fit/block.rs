@@ -61,7 +61,7 @@ pub(super) struct Ports {
 }
 
 /// A configuration's cells over the band as receptances.
-pub(super) struct Block {
+pub(super) struct ReceptanceBlock {
     /// Ports × channels, impacts × ports.
     pub(super) t_u: DMatrix<f64>,
     pub(super) t_f: DMatrix<f64>,
@@ -74,7 +74,7 @@ pub(super) struct Block {
     pub(super) idms: IdmSet,
 }
 
-impl Block {
+impl ReceptanceBlock {
     /// The lines of the file in `band` with a frequency above 0.
     pub(super) fn lines(file: &Measured<'_>, band: Band) -> Vec<usize> {
         (0..file.frf.frequency_hz().len())
@@ -90,10 +90,10 @@ impl Block {
         band: Band,
         sides: &[Side],
         internals: &Internals,
-    ) -> Result<Block, FitError> {
-        let lines = Block::lines(file, band);
-        let mut rows = Axis::default();
-        let mut columns = Axis::default();
+    ) -> Result<ReceptanceBlock, FitError> {
+        let lines = ReceptanceBlock::lines(file, band);
+        let mut rows = CollectedAxis::default();
+        let mut columns = CollectedAxis::default();
         for side in sides {
             let origin = Vector3::from(match side {
                 Side::A => geometry.virtual_point_a_m,
@@ -148,7 +148,7 @@ impl Block {
             }
         }
         let d = balance(idms);
-        Ok(Block {
+        Ok(ReceptanceBlock {
             t_u: rows.transformation(&d),
             t_f: columns.transformation(&d).transpose(),
             cells,
@@ -192,7 +192,7 @@ impl Side {
 
 /// Rows or columns while they are collected.
 #[derive(Default)]
-struct Axis {
+struct CollectedAxis {
     found: Found,
     /// Per point: its side and, for an internal one, its port.
     places: Vec<(usize, Option<usize>)>,
@@ -202,7 +202,7 @@ struct Axis {
     ports: usize,
 }
 
-impl Axis {
+impl CollectedAxis {
     fn add(
         &mut self,
         interface: Found,

@@ -4,7 +4,7 @@
 //! A sensor misplaced by δ measures e·(θ × δ) more, where θ is the rotation of its virtual point; a
 //! hit misplaced by δ adds the moment δ × e; a tilted one pushes along another e.
 
-use super::block::{Block, Impact, Ports, Sensor};
+use super::block::{Impact, Ports, ReceptanceBlock, Sensor};
 use crate::substructuring::vpt::ROTATION_LENGTH_M;
 use nalgebra::{DMatrix, Unit, UnitQuaternion, Vector3};
 
@@ -28,7 +28,7 @@ pub(super) struct CellGeometry {
     pub(super) slopes: DMatrix<f64>,
 }
 
-impl Block {
+impl ReceptanceBlock {
     /// The cell of this sensor and impact with an error of its geometry.
     pub(super) fn cell(&self, sensor: &Sensor, impact: &Impact, error: &CellError) -> CellGeometry {
         let (pushed, slopes) = self.pushed(impact, error);

@@ -17,7 +17,7 @@ type C = Complex<f64>;
 /// The entries of K and C that are free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Shape {
+pub enum FreeEntries {
     /// Diagonal: each degree of freedom independently.
     #[default]
     Diagonal,
@@ -33,7 +33,7 @@ const LOSS: [f64; 2] = [0.0, 2.0];
 /// The parametrisation of one problem.
 #[derive(Debug, Clone)]
 pub(super) struct Chart {
-    pub(super) shape: Shape,
+    pub(super) shape: FreeEntries,
     /// u per degree of freedom, m/N (rotations scaled).
     pub(super) unit: Vec<f64>,
     /// Middle of the band, rad/s.
@@ -62,7 +62,7 @@ pub(super) struct Slopes {
 
 impl Chart {
     pub(super) fn diagonal(unit: Vec<f64>, omega: f64) -> Chart {
-        Chart { shape: Shape::Diagonal, size: vec![1.0; unit.len()], unit, omega }
+        Chart { shape: FreeEntries::Diagonal, size: vec![1.0; unit.len()], unit, omega }
     }
 
     /// The full form around a fitted diagonal, and its start values.
@@ -74,7 +74,7 @@ impl Chart {
             kappa / (1.0 - kappa)
         };
         let size: Vec<f64> = (0..n).map(|d| stiffness(d).sqrt()).collect();
-        let chart = Chart { shape: Shape::Full, size, ..self.clone() };
+        let chart = Chart { shape: FreeEntries::Full, size, ..self.clone() };
         let mut start = DVector::zeros(chart.count());
         for (i, (r, c)) in triangle(n).enumerate() {
             if r == c {
@@ -92,8 +92,8 @@ impl Chart {
     /// Number of parameters.
     pub(super) fn count(&self) -> usize {
         match self.shape {
-            Shape::Diagonal => 2 * self.n(),
-            Shape::Full => self.n() * (self.n() + 1),
+            FreeEntries::Diagonal => 2 * self.n(),
+            FreeEntries::Full => self.n() * (self.n() + 1),
         }
     }
 
@@ -103,8 +103,8 @@ impl Chart {
     pub(super) fn prior(&self) -> DVector<f64> {
         let n = self.n();
         match self.shape {
-            Shape::Diagonal => DVector::from_fn(2 * n, |i, _| if i < n { 0.0 } else { 1.0 }),
-            Shape::Full => {
+            FreeEntries::Diagonal => DVector::from_fn(2 * n, |i, _| if i < n { 0.0 } else { 1.0 }),
+            FreeEntries::Full => {
                 let half = n * (n + 1) / 2;
                 let weights: Vec<f64> = triangle(n)
                     .map(|(r, c)| if r == c { 0.0 } else { self.size[r].powi(-2) })
@@ -119,11 +119,11 @@ impl Chart {
     /// The nearest allowed parameters.
     pub(super) fn bounded(&self, p: &DVector<f64>) -> DVector<f64> {
         match self.shape {
-            Shape::Diagonal => DVector::from_fn(p.len(), |i, _| {
+            FreeEntries::Diagonal => DVector::from_fn(p.len(), |i, _| {
                 let [low, high] = if i < self.n() { KAPPA } else { LOSS };
                 p[i].clamp(low, high)
             }),
-            Shape::Full => p.clone(),
+            FreeEntries::Full => p.clone(),
         }
     }
 
@@ -131,17 +131,17 @@ impl Chart {
     /// it.
     pub(super) fn held(&self, p: &DVector<f64>, i: usize, up: bool) -> bool {
         let [low, high] = match self.shape {
-            Shape::Diagonal if i < self.n() => KAPPA,
-            Shape::Diagonal => LOSS,
-            Shape::Full => return false,
+            FreeEntries::Diagonal if i < self.n() => KAPPA,
+            FreeEntries::Diagonal => LOSS,
+            FreeEntries::Full => return false,
         };
         if up { p[i] >= high } else { p[i] <= low }
     }
 
     pub(super) fn at(&self, p: &DVector<f64>, s: C, slopes: bool) -> At {
         match self.shape {
-            Shape::Diagonal => self.diagonal_at(p, s, slopes),
-            Shape::Full => self.full_at(p, s, slopes),
+            FreeEntries::Diagonal => self.diagonal_at(p, s, slopes),
+            FreeEntries::Full => self.full_at(p, s, slopes),
         }
     }
 

@@ -24,12 +24,12 @@ pub(super) fn rows(x: &DMatrix<f64>, first: usize, count: usize) -> DMatrix<f64>
 /// L of A = L Lᵀ.
 pub(super) struct Factor {
     /// L, in blocks of columns.
-    blocks: Vec<Block>,
+    blocks: Vec<ColumnBlock>,
 }
 
 /// Some columns of L. Stored as separate matrices: views of few rows are slow to multiply, and
 /// their products read past their end.
-struct Block {
+struct ColumnBlock {
     /// Inverse of the diagonal block, and its transpose.
     inverse: DMatrix<f64>,
     inverse_turned: DMatrix<f64>,
@@ -60,7 +60,7 @@ impl Factor {
                 let mut rest = a.view_mut((column, column), (n - column, width));
                 rest -= taken;
             }
-            blocks.push(Block { inverse, inverse_turned, below: panel, below_turned: turned });
+            blocks.push(ColumnBlock { inverse, inverse_turned, below: panel, below_turned: turned });
         }
         Some(Factor { blocks })
     }

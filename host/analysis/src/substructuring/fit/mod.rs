@@ -26,7 +26,7 @@ mod problem;
 mod solver;
 mod weight;
 
-pub use chart::Shape;
+pub use chart::FreeEntries;
 pub use outcome::FittedDof;
 
 use super::averaged::Priors;
@@ -37,7 +37,7 @@ use crate::band::Band;
 use crate::frf::Frf;
 use crate::frf::noise::shared_by_lines;
 use crate::structure::Structure;
-use block::{Block, Side};
+use block::{ReceptanceBlock, Side};
 use model::Layout;
 use nuisance::Nuisances;
 use problem::Problem;
@@ -59,7 +59,7 @@ pub struct Options {
     /// Assumed errors of positions and angles.
     pub priors: Priors,
     /// The entries of K and C that are free.
-    pub shape: Shape,
+    pub shape: FreeEntries,
     /// The points of the assembly that are used.
     pub points: Points,
     /// Assumed difference between A and B alone and A and B in the assembly: a standard deviation,
@@ -73,7 +73,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             priors: Priors::default(),
-            shape: Shape::default(),
+            shape: FreeEntries::default(),
             points: Points::default(),
             mounting: 0.005,
         }
@@ -172,7 +172,7 @@ pub struct Fitted {
     /// Assumed difference of A and B alone from the assembly, as a fraction.
     pub mounting: f64,
     /// The entries that were free.
-    pub shape: Shape,
+    pub shape: FreeEntries,
     /// The diagonal by degree of freedom.
     pub joint: BTreeMap<Dof, FittedDof>,
     /// Stiffness between two degrees of freedom and its standard deviation, of the full form: N/m,
@@ -212,7 +212,7 @@ pub fn fit(
 ) -> Result<Fitted, FitError> {
     let problem = problem(a, b, ajb, geometry, idms, band, options)?;
     let chart = model::chart(&problem);
-    let mut best: Option<solver::Found> = None;
+    let mut best: Option<solver::SearchResult> = None;
     for candidate in model::candidates(&problem, &chart, idms) {
         let found = match solver::search(&problem, &chart, &candidate) {
             Ok(found) => found,
@@ -230,8 +230,8 @@ pub fn fit(
     }
     let diagonal = best.ok_or(FitError::NoMinimum)?;
     let (chart, found) = match options.shape {
-        Shape::Diagonal => (chart, diagonal),
-        Shape::Full => {
+        FreeEntries::Diagonal => (chart, diagonal),
+        FreeEntries::Full => {
             let (chart, start) = chart.full(&diagonal.p);
             let found = solver::search(&problem, &chart, &start)?;
             (chart, found)
@@ -257,7 +257,7 @@ fn problem(
         Measured { file: Structure::B, frf: b, points: &geometry.b },
         Measured { file: Structure::Ajb, frf: ajb, points: &geometry.ajb },
     ];
-    let lines = files.each_ref().map(|file| Block::lines(file, band));
+    let lines = files.each_ref().map(|file| ReceptanceBlock::lines(file, band));
     for (file, own) in files.iter().zip(&lines) {
         let alike = own.len() == lines[2].len()
             && own
@@ -277,7 +277,7 @@ fn problem(
     files[0].virtual_point(Grouping::InterfaceA, geometry, idms)?;
     files[1].virtual_point(Grouping::InterfaceB, geometry, idms)?;
     let of = |file: usize, sides: &[Side], internals: &Internals| {
-        Block::of(&files[file], geometry, idms, band, sides, internals)
+        ReceptanceBlock::of(&files[file], geometry, idms, band, sides, internals)
     };
     let parts = [of(0, &[Side::A], &internals[0])?, of(1, &[Side::B], &internals[1])?];
     let assembly = of(2, &[Side::A, Side::B], &both)?;

@@ -1,6 +1,6 @@
 //! The errors of geometry as nuisance parameters, and their assignment to cells.
 
-use super::block::Block;
+use super::block::ReceptanceBlock;
 use super::cell::CellError;
 use crate::substructuring::averaged::Priors;
 use nalgebra::Vector3;
@@ -31,7 +31,7 @@ pub(super) struct CellNuisances {
 }
 
 impl Nuisances {
-    pub(super) fn of(blocks: &[&Block], priors: &Priors) -> Nuisances {
+    pub(super) fn of(blocks: &[&ReceptanceBlock], priors: &Priors) -> Nuisances {
         let mut n = Nuisances { std: vec![], sensors: vec![], impacts: vec![], aims: vec![] };
         for block in blocks {
             for sensor in block.sensors.iter().filter(|s| !s.internal()) {
@@ -62,7 +62,13 @@ impl Nuisances {
         self.aims.last().copied().unwrap_or_default()
     }
 
-    pub(super) fn of_cell(&self, block: usize, of: &Block, sensor: usize, impact: usize) -> CellNuisances {
+    pub(super) fn of_cell(
+        &self,
+        block: usize,
+        of: &ReceptanceBlock,
+        sensor: usize,
+        impact: usize,
+    ) -> CellNuisances {
         let find =
             |all: &[(String, usize)], name: &str| all.iter().find(|(n, _)| n == name).map(|(_, at)| *at);
         CellNuisances {

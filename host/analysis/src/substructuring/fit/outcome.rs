@@ -1,7 +1,7 @@
 //! From parameters to K and C with intervals, and to warnings where the data do not determine them.
 
-use super::chart::{Chart, Shape};
-use super::solver::Found;
+use super::chart::{Chart, FreeEntries};
+use super::solver::SearchResult;
 use super::{Fitted, Options};
 use crate::band::Band;
 use crate::identified::FITTED_HALF_WIDTH;
@@ -64,7 +64,7 @@ impl FittedDof {
 /// m/rad).
 pub(super) fn joint(
     chart: &Chart,
-    found: &Found,
+    found: &SearchResult,
     idms: IdmSet,
     mounting: f64,
 ) -> (BTreeMap<Dof, FittedDof>, BTreeMap<String, [f64; 2]>) {
@@ -76,7 +76,7 @@ pub(super) fn joint(
     // if the admittance is W (1 + g) instead of W, κ appears as κ + g (1 − κ)
     let mounted = |kappa: f64, std: f64| std.hypot(mounting * (1.0 - kappa));
     match chart.shape {
-        Shape::Diagonal => {
+        FreeEntries::Diagonal => {
             let std = |i: usize| widen * found.covariance[(i, i)].sqrt();
             let dofs = idms
                 .dofs()
@@ -89,7 +89,7 @@ pub(super) fn joint(
                 .collect();
             (dofs, BTreeMap::new())
         }
-        Shape::Full => {
+        FreeEntries::Full => {
             let entry = |which: usize, r: usize, c: usize| {
                 let value = |p: &DVector<f64>| {
                     let (k, loss) = chart.matrices(p);
@@ -201,7 +201,7 @@ impl Fitted {
 /// The public result for a fit over `lines` lines of `band_hz`.
 pub(super) fn fitted(
     chart: &Chart,
-    found: &Found,
+    found: &SearchResult,
     idms: IdmSet,
     band_hz: Band,
     lines: usize,

@@ -9,7 +9,7 @@
 
 use super::FitError;
 use super::assembly_aims::Pushes;
-use super::block::{Block, Line};
+use super::block::{Line, ReceptanceBlock};
 use super::cell::CellGeometry;
 use super::chart::{At, Chart};
 use super::model::{Layout, Predicted, Slopes, Wanted};
@@ -39,8 +39,8 @@ const SEED: u64 = 0x6669_7421;
 /// The measurement, and the layout of the model.
 pub(super) struct Problem {
     /// A, B.
-    pub(super) parts: [Block; 2],
-    pub(super) ajb: Block,
+    pub(super) parts: [ReceptanceBlock; 2],
+    pub(super) ajb: ReceptanceBlock,
     pub(super) layout: Layout,
     pub(super) s: Vec<C>,
     /// Lines of each band.
@@ -68,8 +68,8 @@ pub(super) struct Corrected {
 
 impl Problem {
     pub(super) fn new(
-        parts: [Block; 2],
-        ajb: Block,
+        parts: [ReceptanceBlock; 2],
+        ajb: ReceptanceBlock,
         layout: Layout,
         s: Vec<C>,
         nuisances: Nuisances,
@@ -114,7 +114,7 @@ impl Problem {
     }
 
     /// A, B and AJB, in the order of the nuisance parameters' blocks.
-    pub(super) fn blocks(&self) -> [&Block; 3] {
+    pub(super) fn blocks(&self) -> [&ReceptanceBlock; 3] {
         [&self.parts[0], &self.parts[1], &self.ajb]
     }
 
@@ -145,7 +145,7 @@ impl Problem {
         p: &DVector<f64>,
         eta: &[f64],
     ) -> Result<Corrected, FitError> {
-        let reduced = |block: &Block| -> Vec<Line> {
+        let reduced = |block: &ReceptanceBlock| -> Vec<Line> {
             block.cells.par_iter().map(|cells| block.reduce(cells)).collect()
         };
         let mut parts = self.parts.each_ref().map(reduced);
@@ -348,7 +348,7 @@ pub(super) struct Shift {
 
 impl Shift {
     /// Difference of the reduction of `block` between cells at `moved` and cells at `nominal`.
-    pub(super) fn of(block: &Block, moved: &[CellGeometry], nominal: &[CellGeometry]) -> Shift {
+    pub(super) fn of(block: &ReceptanceBlock, moved: &[CellGeometry], nominal: &[CellGeometry]) -> Shift {
         let (rows, columns) = (block.rows.count, block.columns.count);
         let mut matrix = DMatrix::zeros(rows * columns, rows * columns);
         for (cells, sign) in [(moved, 1.0), (nominal, -1.0)] {

@@ -2,7 +2,7 @@
 //! again at their current estimate.
 
 use super::FitError;
-use super::chart::{Chart, Shape};
+use super::chart::{Chart, FreeEntries};
 use super::factor::Factor;
 use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
@@ -42,7 +42,7 @@ const FEIGNED_MOST: f64 = 0.9;
 
 /// Result of a search.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub(super) p: DVector<f64>,
     pub(super) covariance: DMatrix<f64>,
     /// χ² per degree of freedom.
@@ -85,7 +85,7 @@ struct Linear<'a> {
 
 /// Columns and the sums of their products over the bands.
 #[derive(Clone)]
-struct Sums {
+struct NormalSums {
     /// In units of their noise, one matrix for each band.
     columns: Vec<DMatrix<f64>>,
     /// Gᵀ N⁻¹ times the columns.
@@ -97,8 +97,8 @@ struct Sums {
 /// Residual and derivatives at the start of a descent.
 #[derive(Clone)]
 struct Start {
-    residual: Sums,
-    slopes: Sums,
+    residual: NormalSums,
+    slopes: NormalSums,
 }
 
 impl Linear<'_> {
@@ -106,7 +106,7 @@ impl Linear<'_> {
     fn sums(
         &self,
         of: impl Fn(usize) -> Result<DMatrix<f64>, FitError> + Send + Sync,
-    ) -> Result<Sums, FitError> {
+    ) -> Result<NormalSums, FitError> {
         let by_band: Vec<_> = (0..self.weight.bands.len())
             .into_par_iter()
             .map(|band| {
@@ -124,10 +124,10 @@ impl Linear<'_> {
             pulled += by_nuisance;
             columns.push(of_band);
         }
-        Ok(Sums { columns, pulled, all })
+        Ok(NormalSums { columns, pulled, all })
     }
 
-    fn residual(&self, p: &DVector<f64>) -> Result<Sums, FitError> {
+    fn residual(&self, p: &DVector<f64>) -> Result<NormalSums, FitError> {
         self.sums(|band| {
             // r falls if the model rises
             let residual =
@@ -136,7 +136,7 @@ impl Linear<'_> {
         })
     }
 
-    fn slopes(&self, p: &DVector<f64>) -> Result<Sums, FitError> {
+    fn slopes(&self, p: &DVector<f64>) -> Result<NormalSums, FitError> {
         self.sums(|band| {
             let slopes = self.problem.slopes(self.chart, p, self.data, self.problem.bands[band].clone())?;
             Ok(self.weight.bands[band].whitening.of(slopes))
@@ -179,8 +179,8 @@ struct Products {
 }
 
 impl Pass<'_> {
-    fn products(&self, sums: Sums) -> Products {
-        let Sums { columns, mut pulled, all } = sums;
+    fn products(&self, sums: NormalSums) -> Products {
+        let NormalSums { columns, mut pulled, all } = sums;
         self.marginal.forward(&mut pulled);
         let all = self.integrated(all, &pulled, &pulled);
         Products { columns, pulled, all }
@@ -191,13 +191,13 @@ impl Pass<'_> {
         (all - crossed(one, other) / self.mild) / self.mild
     }
 
-    fn tried(&self, p: &DVector<f64>, residual: Sums) -> Tried {
+    fn tried(&self, p: &DVector<f64>, residual: NormalSums) -> Tried {
         let residual = self.products(residual);
         Tried { cost: residual.all[(0, 0)] + p.dot(&self.prior.component_mul(p)), residual }
     }
 
     /// The score at `p`, given its cost.
-    fn score(&self, p: &DVector<f64>, tried: Tried, slopes: Sums) -> Score {
+    fn score(&self, p: &DVector<f64>, tried: Tried, slopes: NormalSums) -> Score {
         let Tried { cost, residual } = tried;
         let slopes = self.products(slopes);
         let mut downhill = DMatrix::zeros(p.len(), 1);
@@ -300,13 +300,17 @@ impl Pass<'_> {
 }
 
 /// The most likely joint near `start`.
-pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> Result<Found, FitError> {
+pub(super) fn search(
+    problem: &Problem,
+    chart: &Chart,
+    start: &DVector<f64>,
+) -> Result<SearchResult, FitError> {
     let nuisances = problem.nuisances.std.len();
     let freedom = (2 * problem.entries() * problem.bands.len()) as f64;
     let freedom = (freedom - chart.count() as f64).max(1.0);
     let mut p = start.clone();
     let mut eta = DVector::zeros(nuisances);
-    let mut found: Option<Found> = None;
+    let mut found: Option<SearchResult> = None;
     for pass in 0..PASSES {
         let data = problem.corrected(chart, &p, eta.as_slice())?;
         let cells = [0, 1, 2].map(|place| problem.cells(place, eta.as_slice()));
@@ -345,12 +349,14 @@ pub(super) fn search(problem: &Problem, chart: &Chart, start: &DVector<f64>) -> 
         }
         // parameters that the data do not determine may change
         let told = |i: usize| match chart.shape {
-            Shape::Diagonal => i < chart.n() && covariance[(i, i)].sqrt() < TOLD * next[i] * (1.0 - next[i]),
-            Shape::Full => true,
+            FreeEntries::Diagonal => {
+                i < chart.n() && covariance[(i, i)].sqrt() < TOLD * next[i] * (1.0 - next[i])
+            }
+            FreeEntries::Full => true,
         };
         let moved = (0..p.len()).any(|i| told(i) && (next[i] - p[i]).abs() > 0.5 * covariance[(i, i)].sqrt());
         eta = found_eta;
-        found = Some(Found {
+        found = Some(SearchResult {
             p: next.clone(),
             covariance,
             chi_square: chi * mild / freedom,

@@ -10,7 +10,7 @@
 
 use super::FitError;
 use super::assembly_aims::{AssemblyAims, Met, OfImpact};
-use super::block::{Block, Line};
+use super::block::{Line, ReceptanceBlock};
 use super::cell::{CellGeometry, factors};
 use super::chart::Chart;
 use super::factor::rows as own_rows;
@@ -361,7 +361,7 @@ impl Point<'_> {
     /// the effects on the cells, transformed by `left`, times the rows of `right`.
     fn aims(&self, side: usize, ways: &[Way], factors: &DMatrix<f64>, share: f64, effect: &mut DMatrix<f64>) {
         let problem = self.problem;
-        let block: &Block = &problem.parts[side];
+        let block: &ReceptanceBlock = &problem.parts[side];
         let sensors = block.sensors.len();
         let (rows, columns, lines) = (problem.rows.len(), problem.columns.len(), ways.len());
         let effects = effects(factors, ways);

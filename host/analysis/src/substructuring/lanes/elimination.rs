@@ -2,7 +2,7 @@
 
 use super::super::pseudo_inverse::CLEAR;
 use super::matrix::Matrix;
-use super::number::{Cell, Lanes, Sure};
+use super::number::{LaneCell, Lanes, Sure};
 use pulp::{NullaryFnOnce, Simd};
 
 pub(super) fn eliminated<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
@@ -16,9 +16,9 @@ pub(super) fn eliminated<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) 
 struct Elimination<'a, S: Simd> {
     simd: S,
     n: usize,
-    a: &'a mut [Cell<S>],
+    a: &'a mut [LaneCell<S>],
     /// The current column.
-    x: &'a mut [Cell<S>],
+    x: &'a mut [LaneCell<S>],
     swaps: &'a mut Vec<Swap<S>>,
     sure: &'a mut Sure<S>,
 }
@@ -49,14 +49,14 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
             // lets the update below scale row k too
             x.copy_from_slice(column);
             let minus_inverse = -x[k].inv();
-            x[k] = Cell::all(simd, -1.0);
-            column.fill(Cell::all(simd, 0.0));
-            column[k] = Cell::all(simd, 1.0);
+            x[k] = LaneCell::all(simd, -1.0);
+            column.fill(LaneCell::all(simd, 0.0));
+            column[k] = LaneCell::all(simd, 1.0);
             for (c, column) in a.chunks_exact_mut(n).enumerate() {
                 if c != k {
                     swap.in_column(column);
                 }
-                let f = std::mem::replace(&mut column[k], Cell::all(simd, 0.0)) * minus_inverse;
+                let f = std::mem::replace(&mut column[k], LaneCell::all(simd, 0.0)) * minus_inverse;
                 for (v, x) in column.iter_mut().zip(x.iter()) {
                     *v += *x * f;
                 }
@@ -99,7 +99,7 @@ impl<S: Simd> Swap<S> {
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
-    fn in_column(&self, column: &mut [Cell<S>]) {
+    fn in_column(&self, column: &mut [LaneCell<S>]) {
         if self.count == 1 {
             return column.swap(self.k, self.others[0]);
         }
@@ -114,7 +114,7 @@ impl<S: Simd> Swap<S> {
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
-    fn of_columns(&self, a: &mut [Cell<S>], n: usize) {
+    fn of_columns(&self, a: &mut [LaneCell<S>], n: usize) {
         for &other in self.others[..self.count].iter().filter(|other| **other != self.k) {
             let here = self.row.equals(Lanes::all(self.simd, other as f64));
             let (one, two) = a.split_at_mut(other * n);

@@ -1,6 +1,6 @@
 //! A matrix for each line, column-major.
 
-use super::number::{Cell, Lanes, Sure};
+use super::number::{LaneCell, Lanes, Sure};
 use super::pool::Pool;
 use nalgebra::{Complex, DMatrix};
 use pulp::{NullaryFnOnce, Simd};
@@ -12,7 +12,7 @@ pub(crate) struct Matrix<'p, S: Simd> {
     pub(super) pool: &'p Pool<S>,
     rows: usize,
     columns: usize,
-    cells: Vec<Cell<S>>,
+    cells: Vec<LaneCell<S>>,
 }
 
 impl<S: Simd> Drop for Matrix<'_, S> {
@@ -58,11 +58,11 @@ impl<'p, S: Simd> Matrix<'p, S> {
         self.columns
     }
 
-    pub(super) fn cells(&self) -> &[Cell<S>] {
+    pub(super) fn cells(&self) -> &[LaneCell<S>] {
         &self.cells
     }
 
-    pub(super) fn cells_mut(&mut self) -> &mut [Cell<S>] {
+    pub(super) fn cells_mut(&mut self) -> &mut [LaneCell<S>] {
         &mut self.cells
     }
 
@@ -119,7 +119,7 @@ impl<'p, S: Simd> Matrix<'p, S> {
     /// diag(d) Z diag(d) times `factor`, computed as in
     /// [`scaled`](super::super::interface_data::scaled).
     #[must_use]
-    pub(crate) fn scaled(mut self, d: &[f64], factor: Cell<S>) -> Self {
+    pub(crate) fn scaled(mut self, d: &[f64], factor: LaneCell<S>) -> Self {
         let (simd, rows) = (self.pool.simd, self.rows.max(1));
         simd.vectorize(Scaled { simd, cells: &mut self.cells, rows, d, factor });
         self
@@ -150,7 +150,7 @@ impl<'p, S: Simd> Matrix<'p, S> {
 }
 
 struct Read<'a, S: Simd> {
-    into: &'a mut [Cell<S>],
+    into: &'a mut [LaneCell<S>],
     lines: &'a [&'a Line],
     rows: &'a [usize],
     columns: &'a [usize],
@@ -197,8 +197,8 @@ impl<S: Simd> Read<'_, S> {
 }
 
 struct Turned<'a, S: Simd, const CONJUGATE: bool> {
-    from: &'a [Cell<S>],
-    to: &'a mut [Cell<S>],
+    from: &'a [LaneCell<S>],
+    to: &'a mut [LaneCell<S>],
     columns: usize,
 }
 
@@ -219,7 +219,7 @@ impl<S: Simd, const CONJUGATE: bool> NullaryFnOnce for Turned<'_, S, CONJUGATE> 
 }
 
 struct Negated<'a, S: Simd> {
-    cells: &'a mut [Cell<S>],
+    cells: &'a mut [LaneCell<S>],
 }
 
 impl<S: Simd> NullaryFnOnce for Negated<'_, S> {
@@ -236,10 +236,10 @@ impl<S: Simd> NullaryFnOnce for Negated<'_, S> {
 
 struct Scaled<'a, S: Simd> {
     simd: S,
-    cells: &'a mut [Cell<S>],
+    cells: &'a mut [LaneCell<S>],
     rows: usize,
     d: &'a [f64],
-    factor: Cell<S>,
+    factor: LaneCell<S>,
 }
 
 impl<S: Simd> NullaryFnOnce for Scaled<'_, S> {
@@ -259,7 +259,7 @@ impl<S: Simd> NullaryFnOnce for Scaled<'_, S> {
 
 struct Finite<'a, S: Simd> {
     simd: S,
-    cells: &'a [Cell<S>],
+    cells: &'a [LaneCell<S>],
 }
 
 impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
@@ -281,7 +281,7 @@ impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
 }
 
 struct OneLine<'a, S: Simd> {
-    cells: &'a [Cell<S>],
+    cells: &'a [LaneCell<S>],
     lane: usize,
     to: &'a mut [Complex<f64>],
 }
@@ -299,7 +299,7 @@ impl<S: Simd> NullaryFnOnce for OneLine<'_, S> {
 }
 
 struct PutLine<'a, S: Simd> {
-    cells: &'a mut [Cell<S>],
+    cells: &'a mut [LaneCell<S>],
     lane: usize,
     line: &'a [Complex<f64>],
 }

@@ -15,7 +15,7 @@ mod pool;
 mod product;
 
 pub(super) use matrix::{Matrix, lines};
-pub(super) use number::{Cell, Sure};
+pub(super) use number::{LaneCell, Sure};
 pub(super) use pool::Pool;
 pub(super) use product::{minus, plus, product, times, to_left_of};
 

@@ -79,16 +79,16 @@ macro_rules! operators {
             }
         }
 
-        impl<S: Simd> $name for Cell<S> {
+        impl<S: Simd> $name for LaneCell<S> {
             type Output = Self;
 
             #[inline(always)]
             fn $call(self, other: Self) -> Self {
-                Cell { re: self.re.$call(other.re), im: self.im.$call(other.im) }
+                LaneCell { re: self.re.$call(other.re), im: self.im.$call(other.im) }
             }
         }
 
-        impl<S: Simd> $in_place for Cell<S> {
+        impl<S: Simd> $in_place for LaneCell<S> {
             #[inline(always)]
             fn $call_in_place(&mut self, other: Self) {
                 *self = self.$call(other);
@@ -121,17 +121,17 @@ impl<S: Simd> Neg for Lanes<S> {
 
 /// A complex number for each line: a cell of their matrices.
 #[derive(Clone, Copy)]
-pub(crate) struct Cell<S: Simd> {
+pub(crate) struct LaneCell<S: Simd> {
     pub(crate) re: Lanes<S>,
     pub(crate) im: Lanes<S>,
 }
 
-impl<S: Simd> Cell<S> {
+impl<S: Simd> LaneCell<S> {
     /// A real number, the same for all lines.
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn all(simd: S, value: f64) -> Self {
-        Cell { re: Lanes::all(simd, value), im: Lanes::all(simd, 0.0) }
+        LaneCell { re: Lanes::all(simd, value), im: Lanes::all(simd, 0.0) }
     }
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
@@ -143,50 +143,50 @@ impl<S: Simd> Cell<S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn conj(self) -> Self {
-        Cell { im: -self.im, ..self }
+        LaneCell { im: -self.im, ..self }
     }
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn inv(self) -> Self {
         let square = self.norm_sqr();
-        Cell { re: self.re.over(square), im: (-self.im).over(square) }
+        LaneCell { re: self.re.over(square), im: (-self.im).over(square) }
     }
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn where_or(self, mask: S::m64s, other: Self) -> Self {
-        Cell { re: self.re.where_or(mask, other.re), im: self.im.where_or(mask, other.im) }
+        LaneCell { re: self.re.where_or(mask, other.re), im: self.im.where_or(mask, other.im) }
     }
 }
 
-impl<S: Simd> Neg for Cell<S> {
+impl<S: Simd> Neg for LaneCell<S> {
     type Output = Self;
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn neg(self) -> Self {
-        Cell { re: -self.re, im: -self.im }
+        LaneCell { re: -self.re, im: -self.im }
     }
 }
 
-impl<S: Simd> Mul for Cell<S> {
+impl<S: Simd> Mul for LaneCell<S> {
     type Output = Self;
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        Cell { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
+        LaneCell { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
     }
 }
 
-impl<S: Simd> Mul<Lanes<S>> for Cell<S> {
+impl<S: Simd> Mul<Lanes<S>> for LaneCell<S> {
     type Output = Self;
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn mul(self, other: Lanes<S>) -> Self {
-        Cell { re: self.re * other, im: self.im * other }
+        LaneCell { re: self.re * other, im: self.im * other }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::pseudo_inverse::CLEAR;
 use super::matrix::Matrix;
-use super::number::{Cell, Lanes, Sure};
+use super::number::{LaneCell, Lanes, Sure};
 use pulp::{NullaryFnOnce, Simd};
 
 pub(super) fn orthogonalised<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
@@ -18,8 +18,8 @@ struct Orthogonalisation<'a, S: Simd> {
     simd: S,
     m: usize,
     n: usize,
-    q: &'a mut [Cell<S>],
-    r: &'a mut [Cell<S>],
+    q: &'a mut [LaneCell<S>],
+    r: &'a mut [LaneCell<S>],
     sure: &'a mut Sure<S>,
 }
 
@@ -31,7 +31,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
     fn call(self) {
         let Orthogonalisation { simd, m, n, q, r, sure } = self;
         let all = |value| Lanes::all(simd, value);
-        let none = Cell::all(simd, 0.0);
+        let none = LaneCell::all(simd, 0.0);
         let mut largest = all(0.0);
         for k in 0..n {
             let (done, rest) = q.split_at_mut(k * m);
@@ -67,7 +67,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
             sure.only(all(f64::INFINITY).exceeds(largest));
             // the diagonal holds 1/Rₖₖ: multiplications instead of divisions
             let inverse = all(1.0).over(square.sqrt());
-            r[k] = Cell { re: inverse, im: all(0.0) };
+            r[k] = LaneCell { re: inverse, im: all(0.0) };
             for v in v {
                 *v = *v * inverse;
             }
@@ -78,8 +78,8 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
 /// Multiplies each column by R⁻¹.
 struct Substitution<'a, S: Simd> {
     n: usize,
-    x: &'a mut [Cell<S>],
-    r: &'a [Cell<S>],
+    x: &'a mut [LaneCell<S>],
+    r: &'a [LaneCell<S>],
 }
 
 impl<S: Simd> NullaryFnOnce for Substitution<'_, S> {
@@ -102,7 +102,7 @@ impl<S: Simd> NullaryFnOnce for Substitution<'_, S> {
 
 #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
 #[inline(always)]
-fn square_of<S: Simd>(simd: S, v: &[Cell<S>]) -> Lanes<S> {
+fn square_of<S: Simd>(simd: S, v: &[LaneCell<S>]) -> Lanes<S> {
     let mut sum = Lanes::all(simd, 0.0);
     for v in v {
         sum = sum + v.norm_sqr();

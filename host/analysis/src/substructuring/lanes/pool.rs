@@ -1,6 +1,6 @@
 //! Reusable memory for temporary matrices.
 
-use super::number::Cell;
+use super::number::LaneCell;
 use pulp::{NullaryFnOnce, Simd};
 use std::cell::RefCell;
 
@@ -8,7 +8,7 @@ use std::cell::RefCell;
 /// the products.
 pub(crate) struct Pool<S: Simd> {
     pub(crate) simd: S,
-    free: RefCell<Vec<Vec<Cell<S>>>>,
+    free: RefCell<Vec<Vec<LaneCell<S>>>>,
 }
 
 impl<S: Simd> Pool<S> {
@@ -17,7 +17,7 @@ impl<S: Simd> Pool<S> {
     }
 
     /// `count` cells with arbitrary values.
-    pub(super) fn cells(&self, count: usize) -> Vec<Cell<S>> {
+    pub(super) fn cells(&self, count: usize) -> Vec<LaneCell<S>> {
         let mut cells = self.free.borrow_mut().pop().unwrap_or_default();
         if cells.len() < count {
             self.simd.vectorize(Longer { simd: self.simd, cells: &mut cells, count });
@@ -27,14 +27,14 @@ impl<S: Simd> Pool<S> {
     }
 
     /// Returns cells for reuse.
-    pub(super) fn back(&self, cells: Vec<Cell<S>>) {
+    pub(super) fn back(&self, cells: Vec<LaneCell<S>>) {
         self.free.borrow_mut().push(cells);
     }
 }
 
 struct Longer<'a, S: Simd> {
     simd: S,
-    cells: &'a mut Vec<Cell<S>>,
+    cells: &'a mut Vec<LaneCell<S>>,
     count: usize,
 }
 
@@ -44,6 +44,6 @@ impl<S: Simd> NullaryFnOnce for Longer<'_, S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        self.cells.resize(self.count, Cell::all(self.simd, 0.0));
+        self.cells.resize(self.count, LaneCell::all(self.simd, 0.0));
     }
 }

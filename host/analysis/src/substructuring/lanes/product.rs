@@ -1,7 +1,7 @@
 //! Sums and products, computed as in [`product`](super::super::product).
 
 use super::matrix::Matrix;
-use super::number::{Cell, Lanes};
+use super::number::{LaneCell, Lanes};
 use super::pool::Pool;
 use nalgebra::DMatrix;
 use pulp::{NullaryFnOnce, Simd};
@@ -33,11 +33,11 @@ fn sums<'p, S: Simd, A: Factor<S>, B: Factor<S>>(
     factors: &[B],
 ) -> Matrix<'p, S>
 where
-    A::In: Mul<B::In, Output = Cell<S>>,
+    A::In: Mul<B::In, Output = LaneCell<S>>,
 {
     let mut out = Matrix::any(pool, rows, count);
     let simd = pool.simd;
-    simd.vectorize(Sums { simd, out: out.cells_mut(), rows, columns, factors, inner });
+    simd.vectorize(LaneSums { simd, out: out.cells_mut(), rows, columns, factors, inner });
     out
 }
 
@@ -54,8 +54,8 @@ pub(crate) fn minus<'p, S: Simd>(mut a: Matrix<'p, S>, b: &Matrix<'p, S>) -> Mat
 }
 
 struct Added<'a, S: Simd, const PLUS: bool> {
-    a: &'a mut [Cell<S>],
-    b: &'a [Cell<S>],
+    a: &'a mut [LaneCell<S>],
+    b: &'a [LaneCell<S>],
 }
 
 impl<S: Simd, const PLUS: bool> NullaryFnOnce for Added<'_, S, PLUS> {
@@ -76,12 +76,12 @@ pub(crate) trait Factor<S: Simd>: Copy {
     fn ready(self, simd: S) -> Self::In;
 }
 
-impl<S: Simd> Factor<S> for Cell<S> {
-    type In = Cell<S>;
+impl<S: Simd> Factor<S> for LaneCell<S> {
+    type In = LaneCell<S>;
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
-    fn ready(self, _: S) -> Cell<S> {
+    fn ready(self, _: S) -> LaneCell<S> {
         self
     }
 }
@@ -96,20 +96,20 @@ impl<S: Simd> Factor<S> for f64 {
     }
 }
 
-impl<S: Simd> Mul<Cell<S>> for Lanes<S> {
-    type Output = Cell<S>;
+impl<S: Simd> Mul<LaneCell<S>> for Lanes<S> {
+    type Output = LaneCell<S>;
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
-    fn mul(self, other: Cell<S>) -> Cell<S> {
+    fn mul(self, other: LaneCell<S>) -> LaneCell<S> {
         other * self
     }
 }
 
 /// A B, all column-major.
-struct Sums<'a, S: Simd, A, B> {
+struct LaneSums<'a, S: Simd, A, B> {
     simd: S,
-    out: &'a mut [Cell<S>],
+    out: &'a mut [LaneCell<S>],
     rows: usize,
     columns: &'a [A],
     factors: &'a [B],
@@ -119,16 +119,16 @@ struct Sums<'a, S: Simd, A, B> {
 /// Number of rows of a sum that are kept in the processor's registers.
 const TILE: usize = 3;
 
-impl<S: Simd, A: Factor<S>, B: Factor<S>> NullaryFnOnce for Sums<'_, S, A, B>
+impl<S: Simd, A: Factor<S>, B: Factor<S>> NullaryFnOnce for LaneSums<'_, S, A, B>
 where
-    A::In: Mul<B::In, Output = Cell<S>>,
+    A::In: Mul<B::In, Output = LaneCell<S>>,
 {
     type Output = ();
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        let Sums { simd, out, rows, columns, factors, inner } = self;
+        let LaneSums { simd, out, rows, columns, factors, inner } = self;
         for (column, sum) in out.chunks_exact_mut(rows.max(1)).enumerate() {
             let factors = &factors[column * inner..(column + 1) * inner];
             let mut row = 0;
@@ -149,15 +149,15 @@ where
 #[inline(always)]
 fn add<S: Simd, A: Factor<S>, B: Factor<S>, const R: usize>(
     simd: S,
-    out: &mut [Cell<S>],
+    out: &mut [LaneCell<S>],
     columns: &[A],
     rows: usize,
     row: usize,
     factors: &[B],
 ) where
-    A::In: Mul<B::In, Output = Cell<S>>,
+    A::In: Mul<B::In, Output = LaneCell<S>>,
 {
-    let mut sum = [Cell::all(simd, 0.0); R];
+    let mut sum = [LaneCell::all(simd, 0.0); R];
     let part = |column: usize| -> &[A] { &columns[column * rows + row..][..R] };
     let mut threes = factors.chunks_exact(3);
     let mut column = 0;

@@ -13,7 +13,7 @@ type Line = DMatrix<C>;
 pub(super) const ASSEMBLED: usize = 2;
 
 /// A measured block with the transformations to a reduced one: T_l Y\[rows, columns\] T_r.
-pub(super) struct Source<'a> {
+pub(super) struct MeasuredBlock<'a> {
     pub(super) file: usize,
     pub(super) rows: &'a [usize],
     pub(super) t_l: Option<&'a DMatrix<f64>>,
@@ -24,7 +24,7 @@ pub(super) struct Source<'a> {
 /// Derivative of Z_dd by a cell: row d of `left` at the cell's row times row d of `right` at its
 /// column.
 struct Dyad<'a> {
-    source: &'a Source<'a>,
+    source: &'a MeasuredBlock<'a>,
     /// Whether it contributes to h* instead of g.
     conjugate: bool,
     /// Degree of freedom × row.
@@ -39,21 +39,27 @@ pub(super) struct Dyads<'a>(Vec<Dyad<'a>>);
 
 impl<'a> Dyads<'a> {
     /// Adds L δA R.
-    pub(super) fn linear(&mut self, source: &'a Source<'a>, l: &Line, r: &Line) {
+    pub(super) fn linear(&mut self, source: &'a MeasuredBlock<'a>, l: &Line, r: &Line) {
         let left = source.t_l.map_or_else(|| l.clone(), |t| product(l, t));
         let right = source.t_r.map_or_else(|| r.clone(), |t| product(t, r));
         self.0.push(Dyad { source, conjugate: false, left, right: right.transpose() });
     }
 
     /// Adds X δAᴴ W.
-    fn adjoint(&mut self, source: &'a Source<'a>, x: &Line, w: &Line) {
+    fn adjoint(&mut self, source: &'a MeasuredBlock<'a>, x: &Line, w: &Line) {
         let rows = source.t_l.map_or_else(|| w.clone(), |t| product(&t.transpose(), w));
         let columns = source.t_r.map_or_else(|| x.clone(), |t| product(x, &t.transpose()));
         self.0.push(Dyad { source, conjugate: true, left: rows.adjoint(), right: columns.conjugate() });
     }
 
     /// Adds L δ(A⁺) R.
-    pub(super) fn inverse(&mut self, source: &'a Source<'a>, l: &Line, [a, plus]: [&Line; 2], r: &Line) {
+    pub(super) fn inverse(
+        &mut self,
+        source: &'a MeasuredBlock<'a>,
+        l: &Line,
+        [a, plus]: [&Line; 2],
+        r: &Line,
+    ) {
         let (rows, columns) = a.shape();
         self.linear(source, &(-product(l, plus)), &product(plus, r));
         let adjoint = plus.adjoint();
@@ -219,8 +225,8 @@ impl Both {
         }
     }
 
-    pub(super) fn source(&self) -> Source<'_> {
-        Source {
+    pub(super) fn source(&self) -> MeasuredBlock<'_> {
+        MeasuredBlock {
             file: ASSEMBLED,
             rows: &self.rows,
             t_l: Some(&self.t_u),
@@ -230,8 +236,8 @@ impl Both {
     }
 }
 
-pub(super) fn own(side: Side, at: &Balanced) -> Source<'_> {
-    Source {
+pub(super) fn own(side: Side, at: &Balanced) -> MeasuredBlock<'_> {
+    MeasuredBlock {
         file: side as usize,
         rows: &at.vp.rows.at,
         t_l: Some(&at.t_u),

@@ -21,10 +21,10 @@ use super::joint_over_bands::median;
 use super::method::Method;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
-use super::reduced::{Kind, Reduced, RefusedReason, every_line};
+use super::reduced::{MethodKind, Reduced, RefusedReason, every_line};
 use super::rooms::{Rooms, Side};
 use crate::band::Band;
-use dyads::{ASSEMBLED, Both, Dyads, Source, own};
+use dyads::{ASSEMBLED, Both, Dyads, MeasuredBlock, own};
 use nalgebra::{Complex, DMatrix};
 use std::collections::BTreeMap;
 
@@ -54,8 +54,8 @@ impl Reduced {
         let own = [own(Side::A, &self.a), own(Side::B, &self.b)];
         let [y_a, y_b] = self.alone(rooms)?;
         let lines = y_a.len();
-        let by_line: Result<Vec<Vec<[f64; 2]>>, RefusedReason> = match Kind::from(method) {
-            Kind::Internal(seen, hit, which) => {
+        let by_line: Result<Vec<Vec<[f64; 2]>>, RefusedReason> = match MethodKind::from(method) {
+            MethodKind::Internal(seen, hit, which) => {
                 let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
                 let sources = Sources::of(&internals);
                 every_line(lines, |l| {
@@ -63,7 +63,7 @@ impl Reduced {
                     Ok(self.deviations(rooms, noises, l, &dyads))
                 })
             }
-            Kind::Interface => {
+            MethodKind::Interface => {
                 let both = Both::of(self.assembled()?);
                 let (both, y) = (both.source(), self.assembly(rooms)?);
                 every_line(lines, |l| {
@@ -71,7 +71,7 @@ impl Reduced {
                     Ok(self.deviations(rooms, noises, l, &dyads))
                 })
             }
-            Kind::Primal(block) => {
+            MethodKind::Primal(block) => {
                 let both = Both::of(self.assembled()?);
                 let (both, z) = (both.source(), self.impedance(rooms)?);
                 let (at, y, own) = match block {
@@ -88,7 +88,7 @@ impl Reduced {
                     Ok(self.deviations(rooms, noises, l, &dyads))
                 })
             }
-            Kind::Inverse(block) => {
+            MethodKind::Inverse(block) => {
                 let both = Both::of(self.assembled()?);
                 let (both, z) = (both.source(), self.impedance(rooms)?);
                 let n = self.idms.count();
@@ -125,8 +125,8 @@ impl Reduced {
         rooms: &Rooms<'_>,
         l: usize,
         [y_a, y_b, y]: [&Line; 3],
-        both: &'a Source<'a>,
-        own: &'a [Source<'a>; 2],
+        both: &'a MeasuredBlock<'a>,
+        own: &'a [MeasuredBlock<'a>; 2],
     ) -> Result<Dyads<'a>, RefusedReason> {
         let [d, w] = stiffnesses(y_a, y_b, y).map_err(refused(rooms, l))?;
         let relative = boolean_difference(self.idms.count());
@@ -145,7 +145,7 @@ impl Reduced {
         [y_a, y_b]: [&Line; 2],
         internals: &Rearrangement<'_>,
         sources: &'a Sources<'a>,
-        own: &'a [Source<'a>; 2],
+        own: &'a [MeasuredBlock<'a>; 2],
     ) -> Result<Dyads<'a>, RefusedReason> {
         let (p, q, m) = (internals.p(l)?, internals.q(l)?, internals.m(l)?);
         let mut dyads = Dyads::default();
@@ -200,9 +200,9 @@ fn refused<'a>(rooms: &'a Rooms<'_>, l: usize) -> impl Fn(DecouplingError) -> Re
 
 /// The blocks that P, Q and M consist of.
 struct Sources<'a> {
-    p: Source<'a>,
-    q: Source<'a>,
-    m: Vec<Source<'a>>,
+    p: MeasuredBlock<'a>,
+    q: MeasuredBlock<'a>,
+    m: Vec<MeasuredBlock<'a>>,
     /// Signs of M's blocks.
     signs: [f64; 2],
 }
@@ -210,7 +210,7 @@ struct Sources<'a> {
 impl<'a> Sources<'a> {
     fn of(internals: &'a Rearrangement<'a>) -> Sources<'a> {
         let (seen, hit) = (internals.seen_at, internals.hit_at);
-        let block = |file: usize, rows: &'a [usize], columns: &'a [usize]| Source {
+        let block = |file: usize, rows: &'a [usize], columns: &'a [usize]| MeasuredBlock {
             file,
             rows,
             t_l: None,
@@ -225,11 +225,11 @@ impl<'a> Sources<'a> {
             (vec![assembled], [1.0, 1.0])
         };
         Sources {
-            p: Source {
+            p: MeasuredBlock {
                 t_r: Some(&seen.t_f),
                 ..block(internals.seen as usize, &internals.rows.at, &seen.vp.columns.at)
             },
-            q: Source {
+            q: MeasuredBlock {
                 t_l: Some(&hit.t_u),
                 ..block(internals.hit as usize, &hit.vp.rows.at, &internals.columns.at)
             },

@@ -5,7 +5,7 @@ use jointrig_protocol::channel::Role;
 use jointrig_protocol::event::Reason;
 use jointrig_protocol::limits::SHAKE_SCANS_PER_CYCLE;
 
-use super::Options;
+use super::LevelOptions;
 use crate::campaign::plan::level::Held;
 use crate::campaign::store::error::StoreError;
 use crate::device::channels::ChannelMap;
@@ -106,7 +106,7 @@ pub fn check_fit(
     address: &str,
     info: &Info,
     channels: &ChannelMap,
-    options: &Options,
+    options: &LevelOptions,
 ) -> Result<(), ShakeError> {
     let unfit = |what: String| Err(ShakeError::Unfit { address: address.into(), what });
     if info.drive_v <= 0.0 {

@@ -88,7 +88,7 @@ pub struct Summary {
 pub fn run(
     store: &mut Store,
     session: &mut Session,
-    options: &Options,
+    options: &LevelOptions,
     tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
 ) -> Result<Summary, ShakeError> {
     run_watched(store, session, options, &Onlookers::default(), tell)
@@ -101,7 +101,7 @@ pub fn run(
 pub fn run_watched(
     store: &mut Store,
     session: &mut Session,
-    options: &Options,
+    options: &LevelOptions,
     onlookers: &Onlookers,
     tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
 ) -> Result<Summary, ShakeError> {
@@ -235,7 +235,7 @@ struct Bench<'a> {
     channels: &'a ChannelMap,
     load_cells: Vec<(usize, f64)>,
     info: &'a Info,
-    options: &'a Options,
+    options: &'a LevelOptions,
     onlookers: &'a Onlookers,
     session_id: i64,
     epoch: u32,
@@ -590,7 +590,7 @@ const OF_FULL_SCALE: f64 = 0.95;
 
 /// How levels are measured.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct LevelOptions {
     /// The levels, in order.
     pub levels: Vec<Level>,
     /// Before or after the hammer's cells.
@@ -602,7 +602,7 @@ pub struct Options {
     /// The drive's largest amplitude, V; its full scale if absent.
     pub most_drive_v: Option<f64>,
     /// Limits that stop the shaker.
-    pub limits: Limits,
+    pub limits: ChannelLimits,
     /// Continue even if device or rig indicate another structure than that of the file's records.
     pub new_structure: bool,
     /// Set to bring the shaker to rest and end the run.
@@ -620,9 +620,9 @@ pub struct Onlookers {
 
 /// Limits by channel name, SI units; they apply throughout a level.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Limits(pub Vec<(String, f64)>);
+pub struct ChannelLimits(pub Vec<(String, f64)>);
 
-impl Limits {
+impl ChannelLimits {
     /// The limit of each channel, in the order of the scan; 0 for no limit.
     pub fn of(&self, channels: &ChannelMap) -> Vec<f64> {
         (0..channels.len())
@@ -733,8 +733,8 @@ mod options_tests {
             ],
         };
         let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-8);
-        assert!(near(&Limits::default().of(&channels), &[0.0, 0.0, 9.5e-3]));
-        let own = Limits(vec![("LDV_A".into(), 2e-3), ("hammer".into(), 1.0)]);
+        assert!(near(&ChannelLimits::default().of(&channels), &[0.0, 0.0, 9.5e-3]));
+        let own = ChannelLimits(vec![("LDV_A".into(), 2e-3), ("hammer".into(), 1.0)]);
         assert!(near(&own.of(&channels), &[1.0, 2e-3, 9.5e-3]));
     }
 }

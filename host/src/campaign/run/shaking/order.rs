@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use jointrig_protocol::answer::{Info, Shaker};
 use jointrig_protocol::request::Shake;
 
-use super::Options;
+use super::LevelOptions;
 use super::error::{ShakeError, Shortfall};
 use crate::campaign::plan::level::{Held, Level};
 use crate::device::channels::ChannelMap;
@@ -34,7 +34,7 @@ pub struct Orders {
 }
 
 impl Orders {
-    pub fn new(channels: &ChannelMap, info: &Info, level: &Level, options: &Options) -> Self {
+    pub fn new(channels: &ChannelMap, info: &Info, level: &Level, options: &LevelOptions) -> Self {
         let full_v = f64::from(info.drive_v);
         let (amplitude_v, slew) = match level.held {
             Held::Drive => (level.amplitude, level.amplitude),
