@@ -73,14 +73,14 @@ impl Events {
     pub fn push(&mut self, at_scan: u64, event: Event) -> u32 {
         if matches!(event, Event::Counters(_)) {
             // only the newest counters matter; replacing older ones loses nothing
-            self.waiting.retain(|waiting| !same_kind(&waiting.event, &event));
+            self.discard(|waiting| same_kind(waiting, &event));
         }
         let mut dropped = 0;
         if self.waiting.is_full() {
             dropped = 1;
             self.next = self.next.wrapping_add(1);
             match self.dispensable(&event) {
-                Some(place) => drop(self.waiting.remove(place)),
+                Some(place) => self.drop_at(place),
                 None => return dropped,
             }
         }
@@ -89,14 +89,49 @@ impl Events {
         dropped
     }
 
+    /// Moves the event at `place` to the end of the queue; the newer ones move up. With a `pop`,
+    /// this does what `Vec::remove` does, but exchanges events: `Vec::remove` needs `memmove`,
+    /// 1.5 kB of flash that nothing else on a board uses.
+    #[inline(never)]
+    fn move_to_end(&mut self, place: usize) {
+        let mut events = self.waiting.iter_mut().skip(place);
+        let Some(mut moved) = events.next() else { return };
+        for newer in events {
+            core::mem::swap(moved, newer);
+            moved = newer;
+        }
+    }
+
+    /// Drops the event at `place`.
+    fn drop_at(&mut self, place: usize) {
+        self.move_to_end(place);
+        drop(self.waiting.pop());
+    }
+
+    /// Drops the events that `which` selects; the others keep their order.
+    fn discard(&mut self, which: impl Fn(&Event) -> bool) {
+        // from the newest on, so that no event moves into a place that was already passed
+        for place in (0..self.waiting.len()).rev() {
+            if self.waiting.get(place).is_some_and(|waiting| which(&waiting.event)) {
+                self.drop_at(place);
+            }
+        }
+    }
+
     /// Index of the event to drop in favour of `event` in a full queue; `None` when `event` itself
     /// is to be dropped.
     fn dispensable(&self, event: &Event) -> Option<usize> {
-        let ranks = self.waiting.iter().map(|waiting| rank(&waiting.event)).enumerate();
-        // among equal ranks the first one, which is the oldest
-        let (place, lowest) = ranks.min_by_key(|(_, rank)| *rank)?;
-        if lowest < rank(event) {
-            return Some(place);
+        let mut lowest = rank(event);
+        let mut dispensable = None;
+        for (place, waiting) in self.waiting.iter().enumerate() {
+            let rank = rank(&waiting.event);
+            // among equal ranks the first one, which is the oldest
+            if rank < lowest {
+                (lowest, dispensable) = (rank, Some(place));
+            }
+        }
+        if dispensable.is_some() {
+            return dispensable;
         }
         if rank(event) < Rank::Safety {
             return None;
@@ -104,18 +139,15 @@ impl Events {
         // only states of guard and stop remain: drop the oldest one that is superseded by a newer
         // one of its kind
         let after = |place: usize| self.waiting.iter().skip(place + 1).map(|waiting| &waiting.event);
-        (0..self.waiting.len()).find(|place| {
-            let own = &self.waiting[*place].event;
-            same_kind(own, event) || after(*place).any(|newer| same_kind(own, newer))
+        self.waiting.iter().enumerate().position(|(place, own)| {
+            same_kind(&own.event, event) || after(place).any(|newer| same_kind(&own.event, newer))
         })
     }
 
     /// Takes the oldest event and numbers it.
     pub fn pop(&mut self) -> Option<Numbered> {
-        if self.waiting.is_empty() {
-            return None;
-        }
-        let Waiting { at_scan, event } = self.waiting.remove(0);
+        self.move_to_end(0);
+        let Waiting { at_scan, event } = self.waiting.pop()?;
         Some(self.number(at_scan, event))
     }
 
@@ -130,9 +162,9 @@ impl Events {
     /// host would take them for results of its own requests. Faults and the states of guard and
     /// stop are kept for the new host.
     pub fn begin_session(&mut self) {
-        self.waiting.retain(|waiting| match rank(&waiting.event) {
-            Rank::Repeated | Rank::Ordered => false,
-            Rank::Fault | Rank::Safety => !matches!(waiting.event, Event::Clock(_)),
+        self.discard(|waiting| match rank(waiting) {
+            Rank::Repeated | Rank::Ordered => true,
+            Rank::Fault | Rank::Safety => matches!(waiting, Event::Clock(_)),
         });
     }
 }

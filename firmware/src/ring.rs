@@ -164,7 +164,12 @@ impl<'a> Ring<'a> {
 
     /// Takes the oldest unreported loss, and its cause.
     pub fn take_loss(&mut self) -> Option<(Range, Loss)> {
-        (!self.unreported.is_empty()).then(|| self.unreported.remove(0))
+        // exchanges instead of `Vec::remove`, for the reason given in crate::events
+        let mut taken = self.unreported.pop()?;
+        for loss in self.unreported.iter_mut().rev() {
+            core::mem::swap(loss, &mut taken);
+        }
+        Some(taken)
     }
 
     /// Discards the losses of a stream whose session has ended.
