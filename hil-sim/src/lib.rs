@@ -7,7 +7,7 @@
 //! rig only by its name.
 
 pub mod board;
-pub mod desk;
+pub mod console;
 pub mod executor;
 pub mod link;
 pub mod rig;

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use jointrig_hil_sim::board::{Controls, VirtualBoard};
-use jointrig_hil_sim::{desk, serve};
+use jointrig_hil_sim::{console, serve};
 
 /// The simulated friction rig with its controller's firmware.
 #[derive(Parser)]
@@ -90,7 +90,7 @@ fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
 fn stand_at(controls: &Arc<Controls>) {
     let controls = Arc::clone(controls);
     std::thread::spawn(move || {
-        if let Err(error) = desk::listen(&controls, std::io::stdin().lock(), std::io::stderr()) {
+        if let Err(error) = console::listen(&controls, std::io::stdin().lock(), std::io::stderr()) {
             eprintln!("stdin is not listened to any more: {error}");
         }
     });

@@ -20,9 +20,9 @@ pub mod cli;
 pub mod dashboard;
 pub mod device;
 pub mod exchange;
-mod foreign;
 #[cfg(feature = "dashboard")]
 pub mod live;
-mod outside;
 pub mod report;
 pub mod results;
+mod untrusted_input;
+mod untrusted_text;

@@ -10,7 +10,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::watch::{Seen, Shaking, Standing, Watch};
 use jointrig::device::stream::Accounts;
 use jointrig::device::tap::tap;
-use jointrig::live::eye::{eye, room};
+use jointrig::live::watcher::{room, watcher};
 use peak_alloc::PeakAlloc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -64,17 +64,17 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").unwrap();
     let cells = store.cells().unwrap();
-    let (eye, ear) = eye();
+    let (watcher, ear) = watcher();
     let mut cycles = room();
     let codes = vec![1_i16; 51_200];
     let used = allocated(|| {
         for attempts in 0..5_000 {
             let (row, standing) = (&cells[0], Standing { kept: 1, attempts });
-            eye.saw(&Seen::Settling { row, standing, most_s: 25.0, by_hand: false });
-            eye.saw(&Seen::Recording);
-            eye.saw(&Seen::Judging);
-            eye.saw(&Seen::Link(Accounts::default()));
-            eye.saw(&Seen::Shaking(Shaking {
+            watcher.saw(&Seen::Settling { row, standing, most_s: 25.0, by_hand: false });
+            watcher.saw(&Seen::Recording);
+            watcher.saw(&Seen::Judging);
+            watcher.saw(&Seen::Link(Accounts::default()));
+            watcher.saw(&Seen::Shaking(Shaking {
                 at_s: 0.1,
                 amplitude: 1e-7,
                 drive_v: 0.1,

@@ -3,8 +3,8 @@
 mod board;
 mod clamp_b;
 mod config;
+mod console;
 mod contact;
-mod desk;
 mod fixed;
 mod flaws;
 mod frf;

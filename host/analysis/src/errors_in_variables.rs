@@ -14,14 +14,14 @@ const NOTHING: f64 = f64::EPSILON * f64::EPSILON;
 /// The axes of the information matrix and the fraction of information along each that is due to
 /// noise.
 #[derive(Debug, Clone)]
-pub struct Feigned {
+pub struct NoiseInflation {
     /// Columns x with xᵀ J x = 1.
     axes: DMatrix<f64>,
     /// xᵀ N x for each column.
     fraction: DVector<f64>,
 }
 
-impl Feigned {
+impl NoiseInflation {
     /// From J and N, both n × n and symmetric; `None` if J is not positive, or if either contains
     /// values that are not finite.
     pub fn of(information: DMatrix<f64>, noise: &DMatrix<f64>) -> Option<Self> {
@@ -38,7 +38,7 @@ impl Feigned {
         let found = fractions.symmetric_eigen();
         let axes = root.transpose().solve_upper_triangular(&found.eigenvectors)?;
         let numbers = axes.iter().chain(found.eigenvalues.iter()).all(|v| v.is_finite());
-        numbers.then_some(Feigned { axes, fraction: found.eigenvalues })
+        numbers.then_some(NoiseInflation { axes, fraction: found.eigenvalues })
     }
 
     /// Σ weight(fraction) x xᵀ over the axes: with 1/(1 − f) the inverse of J − N, with 1/(1 − f)²
@@ -61,11 +61,13 @@ mod tests {
         noise.column_mut(2).fill(1e-170);
         noise[(2, 0)] = 1e-200;
         noise[(0, 2)] = 1e-200;
-        let feigned = Feigned::of(DMatrix::identity(3, 3), &noise).expect("positive");
-        let inverse = feigned.weighed(|f| 1.0 / (1.0 - f));
+        let noise_inflation = NoiseInflation::of(DMatrix::identity(3, 3), &noise).expect("positive");
+        let inverse = noise_inflation.weighed(|f| 1.0 / (1.0 - f));
         let expected = DMatrix::from_diagonal(&DVector::from_vec(vec![4.0 / 3.0, 4.0 / 3.0, 1.0]));
         assert!((inverse - expected).norm() < 1e-12);
-        assert!(Feigned::of(DMatrix::identity(2, 2), &DMatrix::from_element(2, 2, f64::NAN)).is_none());
+        assert!(
+            NoiseInflation::of(DMatrix::identity(2, 2), &DMatrix::from_element(2, 2, f64::NAN)).is_none()
+        );
     }
 
     #[test]
@@ -75,12 +77,12 @@ mod tests {
         let information = &root * root.transpose();
         let part = root.columns(0, 3);
         let noise = part * part.transpose() * 0.4;
-        let feigned = Feigned::of(information.clone(), &noise).expect("positive");
+        let noise_inflation = NoiseInflation::of(information.clone(), &noise).expect("positive");
         let inverse = (&information - &noise).try_inverse().expect("regular");
         let covariance = &inverse * &information * &inverse;
         // rounding: the condition number is below 1e4
         let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).norm() < 1e-10 * b.norm();
-        assert!(near(&feigned.weighed(|f| 1.0 / (1.0 - f)), &inverse));
-        assert!(near(&feigned.weighed(|f| (1.0 - f).powi(-2)), &covariance));
+        assert!(near(&noise_inflation.weighed(|f| 1.0 / (1.0 - f)), &inverse));
+        assert!(near(&noise_inflation.weighed(|f| (1.0 - f).powi(-2)), &covariance));
     }
 }

@@ -11,9 +11,9 @@ use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::cell::{CellName, Measurements};
 use super::contact_stage::Contact;
+use super::data_quality::DataQuality;
 use super::from_frfs::Substructured;
 use super::from_store::CampaignFile;
-use super::heard::Heard;
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
@@ -41,7 +41,7 @@ pub struct Findings {
     /// Positions of hammer and vibrometer.
     pub geometry: Vec<Place>,
     /// Data quality of every cell.
-    pub heard: Heard,
+    pub data_quality: DataQuality,
     /// Every cell of a campaign's plan, with its data quality.
     pub cells: Option<Cells>,
     /// All firings of the hammer.

@@ -9,8 +9,8 @@
 
 use super::campaign::analyse_measurements;
 use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, ShakerLevel};
+use super::data_quality::DataQuality;
 use super::findings::Findings;
-use super::heard::Heard;
 use super::plan_geometry::{geometry, places};
 use super::question::{Progress, Wanted};
 use crate::campaign::plan::{Plan, structure};
@@ -177,7 +177,7 @@ pub fn analyse(
     let file = CampaignFile::open(store, wanted.known)?;
     let (source, completeness) = (file.source(store)?, file.completeness());
     let found = analyse_measurements(&file, wanted, progress);
-    let cells = Some(file.cell_rows(&found.heard));
+    let cells = Some(file.cell_rows(&found.data_quality));
     Ok(Findings { source, completeness, cells, geometry: places(&file.plan), hits: file.hit_rows(), ..found })
 }
 
@@ -573,11 +573,11 @@ impl CampaignFile {
     }
 
     /// Every cell of the plan, in order, with its data quality.
-    pub(super) fn cell_rows(&self, heard: &Heard) -> Cells {
+    pub(super) fn cell_rows(&self, data_quality: &DataQuality) -> Cells {
         let rows = self.cells.iter().map(|cell| {
             let count = self.tally.cell(cell.id);
             let name = &cell.name;
-            let own = heard.cells.iter().find(|h| h.name == *name);
+            let own = data_quality.cells.iter().find(|h| h.name == *name);
             results::CellRow {
                 configuration: name.configuration.into(),
                 impact: name.impact.clone(),
@@ -593,7 +593,7 @@ impl CampaignFile {
                 random_error: own.and_then(|h| h.random_error),
             }
         });
-        Cells { cells: rows.collect(), frequency_hz: heard.frequency_hz.clone() }
+        Cells { cells: rows.collect(), frequency_hz: data_quality.frequency_hz.clone() }
     }
 
     /// Every firing of the hammer with a readable record, in order.

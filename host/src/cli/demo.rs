@@ -14,8 +14,8 @@ use crate::campaign::run::stage::Stage;
 use crate::campaign::store::Store;
 use crate::campaign::verdict::judge::ByRecord;
 use crate::device::address::Address;
-use crate::outside::tell_line;
 use crate::report::words;
+use crate::untrusted_text::tell_line;
 
 /// The complete workflow on the built-in simulator: campaign, analysis, report.
 #[derive(Debug, Args)]
@@ -94,9 +94,11 @@ impl Demo {
     fn marks(&self) -> Result<Marks, CliError> {
         let rig = match &self.rig {
             None => "built-in".into(),
-            Some(path) => crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| {
-                CliError::Read { path: path.clone(), doing: "reading the rig's description", source }
-            })?,
+            Some(path) => {
+                crate::untrusted_input::text(path, crate::untrusted_input::SETTINGS).map_err(|source| {
+                    CliError::Read { path: path.clone(), doing: "reading the rig's description", source }
+                })?
+            }
         };
         let plan = if self.full { "paper" } else { "demo" };
         Ok([("demo_plan", plan.into()), ("demo_seed", self.seed.to_string()), ("demo_rig", rig)])

@@ -15,12 +15,12 @@ use crate::exchange::npz::Array;
 use crate::exchange::record_file::RecordFile;
 use crate::exchange::record_uff::read_record_file;
 use crate::exchange::{Extra, StatedUnits, write_frf};
-use crate::outside::tell_line;
 use crate::spectra::{
     CrossSpectra, ForceWeighting, FrfSettings, ImpactRecords, MotionQuantity, Origin, Pulse, PulseSamples,
     Windowing, estimate, reversed_peak_n, several_hits_s, usable_band,
 };
 use crate::substructuring::Band;
+use crate::untrusted_text::tell_line;
 
 /// Compute FRFs from any impact records: a verdict on every hit, and the average of the good ones.
 ///

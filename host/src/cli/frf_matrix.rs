@@ -19,8 +19,8 @@ use crate::exchange::record_uff::{LabelledRecords, by_label, record_contents};
 use crate::exchange::{StatedUnits, write_frf};
 use crate::frf::Frf;
 use crate::frf::common_lines::same;
-use crate::outside::tell_line;
 use crate::spectra::{CrossSpectra, FrfSettings, MotionQuantity, estimate, usable_band};
+use crate::untrusted_text::tell_line;
 
 /// Options for converting records to FRFs.
 pub(super) struct Wishes<'w> {

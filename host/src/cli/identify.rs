@@ -10,12 +10,12 @@ use super::error::CliError;
 use super::output;
 use crate::analyse::{Asked, IdmSets, Question};
 use crate::exchange::{StatedUnits, read_frf_file, read_geometry};
-use crate::outside::tell_line;
 use crate::report::{document, words};
 use crate::results::Source;
 use crate::substructuring::averaged::Priors;
 use crate::substructuring::fit;
 use crate::substructuring::{Band, Configuration, Frf};
+use crate::untrusted_text::tell_line;
 
 /// Identify a joint from any FRFs of A, B and the assembly.
 ///

@@ -15,7 +15,7 @@ use crate::campaign::verdict::judge::Judge;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 
 /// The measuring device.
 pub struct Device<'a> {

@@ -13,7 +13,7 @@
 //! Tunes the system's allocator for short-lived signals and matrices.
 
 use crate::live::forming::analyse_for_another;
-use crate::outside::{tell_line, visible};
+use crate::untrusted_text::{tell_line, visible};
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::CliError;

@@ -9,7 +9,7 @@
 
 use super::error::CliError;
 use crate::campaign::run::progress::Pace;
-use crate::outside::{printed_json, tell_line, visible};
+use crate::untrusted_text::{printed_json, tell_line, visible};
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde::Serialize;
 use std::fmt::Display;

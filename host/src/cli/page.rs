@@ -12,7 +12,7 @@ use crate::campaign::watch::Watchers;
 #[cfg(feature = "dashboard")]
 use crate::dashboard::{Dashboard, Measuring};
 use crate::device::tap::Tap;
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 use clap::Args;
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -74,7 +74,7 @@ impl Page {
         }
         let opened = self.open.then(|| Opened::new(&page.edit_url().unwrap_or_else(|| page.url()))).flatten();
         Ok(Onlooker {
-            watch: Watchers::default().and(hooks.eye as Arc<_>),
+            watch: Watchers::default().and(hooks.watcher as Arc<_>),
             tap: Some(hooks.tap),
             edits: hooks.edits,
             answers: hooks.answers,

@@ -18,7 +18,7 @@ use crate::dashboard::Dashboard;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 
 /// Interval between updates of the link's accounting.
 const LINK: Duration = Duration::from_secs(1);

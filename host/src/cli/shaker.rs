@@ -22,9 +22,9 @@ use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
 use crate::hysteresis::{LoopAnalysis, Shape, analyse};
-use crate::outside::{tell, tell_line};
 use crate::report::words;
 use crate::report::words::number::{decimals, micro};
+use crate::untrusted_text::{tell, tell_line};
 
 /// Measure levels of the shaker: each is controlled to its amplitude, recorded in steady state and
 /// stored.

@@ -19,7 +19,7 @@ use tokio::sync::oneshot;
 use super::Shared;
 use super::routes::Problem;
 use crate::campaign::run::answers::{Answerer, Key, Question};
-use crate::campaign::run::answers::{Desk, Edit, NotTaken};
+use crate::campaign::run::answers::{Edit, EditQueue, NotTaken};
 use crate::campaign::verdict::Verdict;
 use crate::live::message::Message;
 use crate::live::now::{Control, Doing};
@@ -34,9 +34,9 @@ const LONGEST: usize = 2_000;
 const NAME: usize = 64;
 
 /// What the measuring process lets pages do.
-pub struct Doors {
+pub struct Controls {
     /// Receives edits.
-    pub desk: Option<Desk>,
+    pub edit_queue: Option<EditQueue>,
     /// Receives answers to the prompts to move hammer and laser.
     pub answerer: Option<Answerer>,
     /// Ends the measurement after the current shot.
@@ -68,8 +68,8 @@ fn read<T>(asked: EditRequest<T>) -> Result<T, Problem> {
 }
 
 impl Shared {
-    fn doors(&self) -> Result<&Doors, Problem> {
-        self.doors.as_ref().ok_or_else(|| {
+    fn controls(&self) -> Result<&Controls, Problem> {
+        self.controls.as_ref().ok_or_else(|| {
             let what = "this server only looks: nothing is measured in its process";
             Problem::new(StatusCode::FORBIDDEN, what, "use `jointrig campaign keep` and `campaign drop`")
         })
@@ -77,9 +77,9 @@ impl Shared {
 
     /// Ends a page's right to answer when it has been silent for too long.
     pub fn end_lease(&self) {
-        let Some(doors) = &self.doors else { return };
-        let mut lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
-        if lease.take_if(|(_, heard)| heard.elapsed() > LEASE).is_some() {
+        let Some(controls) = &self.controls else { return };
+        let mut lease = controls.lease.lock().unwrap_or_else(PoisonError::into_inner);
+        if lease.take_if(|(_, last_contact)| last_contact.elapsed() > LEASE).is_some() {
             self.bus.say(Message::Control(Control { page: None }));
         }
     }
@@ -87,10 +87,11 @@ impl Shared {
 
 /// Submits an edit and waits briefly for its result.
 async fn handed_in(shared: &Shared, edit: Edit) -> Result<Response, Problem> {
-    let doors = shared.doors()?;
-    let desk = doors.desk.as_ref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
+    let controls = shared.controls()?;
+    let edit_queue =
+        controls.edit_queue.as_ref().ok_or_else(|| Problem::missing("no campaign is measured here"))?;
     let (to, told) = oneshot::channel();
-    let taken = desk.hand_in(edit, move |what| {
+    let taken = edit_queue.hand_in(edit, move |what| {
         // the page may have disconnected
         let _ = to.send(what);
     });
@@ -178,7 +179,7 @@ async fn undo(
 }
 
 async fn stop(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
-    shared.doors()?.stop.store(true, Ordering::Relaxed);
+    shared.controls()?.stop.store(true, Ordering::Relaxed);
     let done = "measuring ends after the shot in hand; this is no emergency stop";
     Ok(Json(json!({ "done": done })).into_response())
 }
@@ -191,14 +192,16 @@ struct Hold {
 
 async fn control(State(shared): State<Arc<Shared>>, asked: EditRequest<Hold>) -> Result<Response, Problem> {
     let Hold { page, hold } = read(asked)?;
-    let doors = shared.doors()?;
-    allowed(doors)?;
+    let controls = shared.controls()?;
+    allowed(controls)?;
     if page.is_empty() || page.chars().count() > NAME {
         let what = format!("a page's name has 1 to {NAME} characters");
         return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, "choose another one"));
     }
-    let mut lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
-    let other = lease.as_ref().is_some_and(|(holder, heard)| *holder != page && heard.elapsed() <= LEASE);
+    let mut lease = controls.lease.lock().unwrap_or_else(PoisonError::into_inner);
+    let other = lease
+        .as_ref()
+        .is_some_and(|(holder, last_contact)| *holder != page && last_contact.elapsed() <= LEASE);
     if other {
         return Err(elsewhere());
     }
@@ -212,8 +215,8 @@ async fn control(State(shared): State<Arc<Shared>>, asked: EditRequest<Hold>) ->
     Ok(Json(json!({ "done": if hold { "this page answers" } else { "no page answers" } })).into_response())
 }
 
-fn allowed(doors: &Doors) -> Result<&Answerer, Problem> {
-    doors.answerer.as_ref().ok_or_else(|| {
+fn allowed(controls: &Controls) -> Result<&Answerer, Problem> {
+    controls.answerer.as_ref().ok_or_else(|| {
         let what = "no page may answer for hammer and laser";
         Problem::new(StatusCode::FORBIDDEN, what, "answer at the terminal, or measure with --allow-control")
     })
@@ -236,8 +239,8 @@ async fn stage(
     asked: EditRequest<StageAnswer>,
 ) -> Result<Response, Problem> {
     let StageAnswer { page, cell, attempt, answer } = read(asked)?;
-    let doors = shared.doors()?;
-    let answerer = allowed(doors)?;
+    let controls = shared.controls()?;
+    let answerer = allowed(controls)?;
     let key = match answer.as_str() {
         "in place" => Key::Accept,
         "redo" => Key::Redo,
@@ -250,8 +253,11 @@ async fn stage(
         }
     };
     {
-        let lease = doors.lease.lock().unwrap_or_else(PoisonError::into_inner);
-        if !lease.as_ref().is_some_and(|(holder, heard)| *holder == page && heard.elapsed() <= LEASE) {
+        let lease = controls.lease.lock().unwrap_or_else(PoisonError::into_inner);
+        if !lease
+            .as_ref()
+            .is_some_and(|(holder, last_contact)| *holder == page && last_contact.elapsed() <= LEASE)
+        {
             return Err(elsewhere());
         }
     }

@@ -26,13 +26,13 @@ use crate::campaign::store::error::StoreError;
 use crate::device::tap::{Tap, View, tap};
 use crate::live::averaging::Averages;
 use crate::live::bus::Bus;
-use crate::live::eye::{Ear, Eye, eye};
 use crate::live::follow::Follower;
 use crate::live::forming::{Formed, form};
 use crate::live::frames::Frames;
 use crate::live::message::{Can, Message, Trouble};
+use crate::live::watcher::{WatchQueue, Watcher, watcher};
 use crate::live::watching::Watching;
-use edit::Doors;
+use edit::Controls;
 use guard::Token;
 
 /// Interval of the checks for changes of the file; a check takes a few microseconds.
@@ -70,7 +70,7 @@ struct Shared {
     /// The token for editing, where editing is possible.
     edit: Option<Token>,
     /// What the measuring process lets pages do.
-    doors: Option<Doors>,
+    controls: Option<Controls>,
     bus: Arc<Bus>,
     formed: Arc<Formed>,
     /// The average spectra of the cell that was requested last.
@@ -91,7 +91,7 @@ pub struct Hooks {
     /// For the session's stream.
     pub tap: Tap,
     /// For the runner.
-    pub eye: Arc<Eye>,
+    pub watcher: Arc<Watcher>,
     /// Changes requested by pages, for the thread that writes the campaign file.
     pub edits: Option<Edits>,
     /// Answers of a page to the prompts to move hammer and laser.
@@ -137,29 +137,31 @@ impl Dashboard {
     /// # Errors
     /// The file cannot be read, or the port cannot be used.
     pub fn of_measuring(measuring: &Measuring<'_>, port: u16) -> Result<(Self, Hooks), DashboardError> {
-        let ((eye, ear), (tap, view)) = (eye(), tap());
-        let (desk, edits) = measuring.file.map(|_| edits()).unzip();
+        let ((watcher, watch_queue), (tap, view)) = (watcher(), tap());
+        let (edit_queue, edits) = measuring.file.map(|_| edits()).unzip();
         let (answerer, answers) = measuring.control.then(|| answers(measuring.stop.clone())).unzip();
-        let doors = Doors { desk, answerer, stop: measuring.stop.clone(), lease: Mutex::default() };
-        let dashboard = Self::start(measuring.file, port, Some((ear, view, doors)))?;
-        Ok((dashboard, Hooks { tap, eye: Arc::new(eye), edits, answers }))
+        let controls =
+            Controls { edit_queue, answerer, stop: measuring.stop.clone(), lease: Mutex::default() };
+        let dashboard = Self::start(measuring.file, port, Some((watch_queue, view, controls)))?;
+        Ok((dashboard, Hooks { tap, watcher: Arc::new(watcher), edits, answers }))
     }
 
     fn start(
         file: Option<&Path>,
         port: u16,
-        measuring: Option<(Ear, View, Doors)>,
+        measuring: Option<(WatchQueue, View, Controls)>,
     ) -> Result<Self, DashboardError> {
         let mut follower = file.map(Follower::new).transpose()?;
         let listener = std::net::TcpListener::bind(("127.0.0.1", port))
             .map_err(|source| DashboardError::Port { port, source })?;
         let address = listener.local_addr().map_err(DashboardError::System)?;
         let look = Token::random().map_err(DashboardError::System)?;
-        let (seen, doors) = measuring.map(|(ear, view, doors)| ((ear, view), doors)).unzip();
+        let (seen, controls) =
+            measuring.map(|(watch_queue, view, controls)| ((watch_queue, view), controls)).unzip();
         let can = Can {
             stream: seen.is_some(),
-            edit: doors.as_ref().is_some_and(|doors| doors.desk.is_some()),
-            control: doors.as_ref().is_some_and(|doors| doors.answerer.is_some()),
+            edit: controls.as_ref().is_some_and(|controls| controls.edit_queue.is_some()),
+            control: controls.as_ref().is_some_and(|controls| controls.answerer.is_some()),
         };
         let edit = can.edit.then(Token::random).transpose().map_err(DashboardError::System)?;
         let (bus, formed, frames) =
@@ -177,17 +179,26 @@ impl Dashboard {
             let (to, shown, ended) = (bus.clone(), formed.clone(), over.clone());
             named("page: estimate", move || form(&path, &to, &shown, &ended))?;
         }
-        if let Some((ear, view)) = seen {
+        if let Some((watch_queue, view)) = seen {
             let (bus, frames, file) = (bus.clone(), frames.clone(), file.map(Path::to_owned));
-            let (watching, ended) = (Watching { ear, view, bus, frames, file }, over.clone());
+            let (watching, ended) = (Watching { watch_queue, view, bus, frames, file }, over.clone());
             tellers.push(named("page: stream", move || watching.watch(&ended))?);
         }
         let file = file.map(Path::to_owned);
         let told = bus.clone();
         let (port, look_token, edit_token) = (address.port(), look.clone(), edit.clone());
         let averages = Averages::default();
-        let shared =
-            Shared { file, port, look: look_token, edit: edit_token, doors, bus, formed, averages, frames };
+        let shared = Shared {
+            file,
+            port,
+            look: look_token,
+            edit: edit_token,
+            controls,
+            bus,
+            formed,
+            averages,
+            frames,
+        };
         let ended = gone.clone();
         let server = named("page: server", move || {
             if let Err(error) = server::serve(listener, shared, &ended) {

@@ -131,7 +131,7 @@ async fn talk(mut socket: WebSocket, shared: Arc<Shared>) {
     let (mut newest, mut frames) = (shared.bus.newest(), shared.frames.newest());
     let mut stream = Stream { looker: None, sent: 0, had: 0, at: *frames.borrow(), missed: 0 };
     stream.want(&shared, hello.stream);
-    let (mut after, mut heard) = (hello.after, Instant::now());
+    let (mut after, mut last_contact) = (hello.after, Instant::now());
     loop {
         newest.mark_unchanged();
         for message in shared.bus.since(after) {
@@ -149,10 +149,10 @@ async fn talk(mut socket: WebSocket, shared: Arc<Shared>) {
         tokio::select! {
             changed = newest.changed() => if changed.is_err() { return },
             changed = frames.changed(), if stream.ready() => if changed.is_err() { return },
-            said = timeout_at(heard + SILENT, socket.recv()) => match said {
+            said = timeout_at(last_contact + SILENT, socket.recv()) => match said {
                 Ok(Some(Ok(Message::Close(_)) | Err(_)) | None) | Err(_) => return,
                 Ok(Some(Ok(message))) => {
-                    heard = Instant::now();
+                    last_contact = Instant::now();
                     if let Message::Text(text) = message && let Ok(word) = serde_json::from_str::<Word>(&text) {
                         stream.hear(&shared, &word);
                     }

@@ -284,13 +284,15 @@ impl Sim {
         let address = || rig.map_or_else(|| "sim:".into(), |path| format!("sim:{}", path.display()));
         let open = |why: String| DeviceError::Open { address: address(), why };
         let text = match rig {
-            Some(path) => Some(crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|error| {
-                open(format!(
-                    "the rig's description {} cannot be read: {error}; {}",
-                    path.display(),
-                    crate::advice::reading(&error)
-                ))
-            })?),
+            Some(path) => Some(
+                crate::untrusted_input::text(path, crate::untrusted_input::SETTINGS).map_err(|error| {
+                    open(format!(
+                        "the rig's description {} cannot be read: {error}; {}",
+                        path.display(),
+                        crate::advice::reading(&error)
+                    ))
+                })?,
+            ),
             None => None,
         };
         let config = text.map_or_else(|| Ok(RigConfig::default()), |text| RigConfig::from_toml(&text));

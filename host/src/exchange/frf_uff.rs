@@ -16,7 +16,7 @@ use super::uff_axes::{Places, Scale, frequency_scale, frf_scale, with_units};
 use super::units::StatedUnits;
 use crate::frf::common_lines::{OtherLines, shared};
 use crate::frf::{Frf, MotionQuantity};
-use crate::{advice, foreign};
+use crate::{advice, untrusted_input};
 use nalgebra::DMatrix;
 use num_complex::Complex;
 use std::collections::HashMap;
@@ -67,7 +67,7 @@ pub fn read_frf_uff(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, Fr
 /// # Errors
 /// [`FrfUffError::Open`] if the file cannot be read.
 pub fn contents(path: &Path) -> Result<Contents, FrfUffError> {
-    let bytes = foreign::bytes(path, foreign::UNIVERSAL)
+    let bytes = untrusted_input::bytes(path, untrusted_input::UNIVERSAL)
         .map_err(|source| FrfUffError::Open { path: path.into(), source })?;
     Ok(read_only(&bytes, &[58, 164]))
 }

@@ -15,7 +15,7 @@ use super::other_formats::{Contents, not_read_here};
 use super::units::StatedUnits;
 use crate::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
-use crate::{advice, foreign};
+use crate::{advice, untrusted_input};
 use std::io;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -287,7 +287,7 @@ pub enum FrfFileError {
 /// It cannot be read.
 pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
     let mut first = Vec::new();
-    foreign::open(path)
+    untrusted_input::open(path)
         .and_then(|(file, _)| file.take(4).read_to_end(&mut first))
         .map_err(|source| FrfFileError::Open { path: path.into(), source })?;
     // a zip archive begins with its first entry, an empty one with its end

@@ -18,7 +18,7 @@
 use super::npy_header::Header;
 use super::units;
 use super::units::{Unit, UnitError};
-use crate::{advice, foreign};
+use crate::{advice, untrusted_input};
 use memchr::memmem;
 use npyz::npz::{array_name_from_file_name, file_name_from_array_name};
 use npyz::{DType, WriteOptions, WriterBuilder};
@@ -62,7 +62,7 @@ impl NpzFile {
     /// [`NpzError::Open`].
     pub fn open(path: &Path) -> Result<Self, NpzError> {
         let (archive, size) = open(path).map_err(|source| NpzError::Open { path: path.into(), source })?;
-        Ok(NpzFile { path: path.into(), archive, size, left: foreign::memory_for(size) })
+        Ok(NpzFile { path: path.into(), archive, size, left: untrusted_input::memory_for(size) })
     }
 
     /// Counts the memory that `array` is about to take in the form in which it is returned.
@@ -78,9 +78,9 @@ impl NpzFile {
         let found = format!(
             "would take {} of memory, and what a file of {} holds may take {} in all: split it, or store it uncompressed and as \
              floats (np.savez)",
-            foreign::megabytes(bytes),
-            foreign::megabytes(self.size),
-            foreign::megabytes(foreign::memory_for(self.size)),
+            untrusted_input::megabytes(bytes),
+            untrusted_input::megabytes(self.size),
+            untrusted_input::megabytes(untrusted_input::memory_for(self.size)),
         );
         Err(self.unexpected(array, &found, expected))
     }
@@ -406,10 +406,10 @@ pub(super) type Opened = (ZipArchive<BufReader<File>>, u64);
 /// Opens the archive at `path`.
 ///
 /// # Errors
-/// As [`foreign::open`]; [`ErrorKind::InvalidData`] for a file that is not a zip archive or lists
+/// As [`untrusted_input::open`]; [`ErrorKind::InvalidData`] for a file that is not a zip archive or lists
 /// too many members.
 pub(super) fn open(path: &Path) -> io::Result<Opened> {
-    let (mut file, size) = foreign::open(path)?;
+    let (mut file, size) = untrusted_input::open(path)?;
     refuse_long_lists(&mut file, size)?;
     Ok((ZipArchive::new(BufReader::new(file))?, size))
 }

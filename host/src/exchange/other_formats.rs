@@ -1,7 +1,7 @@
 //! Recognises files of other programs that are not read here by their first bytes, and shows Python
 //! lines that convert each of them to npz.
 
-use crate::foreign;
+use crate::untrusted_input;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -185,7 +185,7 @@ fn said(path: &Path, first: &[u8], wanted: Contents) -> Option<String> {
 /// An error of the operating system.
 pub(super) fn not_read_here(path: &Path, wanted: Contents) -> io::Result<Option<String>> {
     let mut first = Vec::new();
-    foreign::open(path).and_then(|(file, _)| file.take(LOOKED_AT).read_to_end(&mut first))?;
+    untrusted_input::open(path).and_then(|(file, _)| file.take(LOOKED_AT).read_to_end(&mut first))?;
     Ok(said(path, &first, wanted))
 }
 

@@ -8,7 +8,7 @@
 
 use super::tables::{SheetCell, Tables, csv_tables, workbook_tables};
 use crate::substructuring::geometry::{Configuration, FARTHEST_M, Geometry, Grouping, Point};
-use crate::{advice, foreign};
+use crate::{advice, untrusted_input};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -370,7 +370,7 @@ fn of_any_size(path: &Path) -> Result<(Geometry, Vec<String>), GeometryFileError
         let positions = read_positions(path)?;
         return Ok((positions.geometry, positions.warnings));
     }
-    let text = foreign::text(path, foreign::SETTINGS)
+    let text = untrusted_input::text(path, untrusted_input::SETTINGS)
         .map_err(|source| GeometryFileError::Read { path: path.into(), source })?;
     let geometry = toml::from_str(&text).map_err(|error| GeometryFileError::Toml {
         path: path.into(),

@@ -7,8 +7,8 @@
 //! claims, and keeps the inflated texts in memory. Both are checked here by inflating every part
 //! once and discarding it.
 
-use crate::foreign::megabytes;
-use crate::{advice, foreign};
+use crate::untrusted_input::megabytes;
+use crate::{advice, untrusted_input};
 use calamine::{DataRef, Reader, Xlsx};
 use memchr::memmem;
 use std::collections::BTreeMap;
@@ -90,7 +90,7 @@ fn too_many_rows(at: &str) -> String {
 
 /// Reads the wanted sheets of a workbook, or returns why it cannot be read.
 pub(super) fn workbook_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String> {
-    let bytes = foreign::bytes(path, MOST_BYTES).map_err(|error| told(&error))?;
+    let bytes = untrusted_input::bytes(path, MOST_BYTES).map_err(|error| told(&error))?;
     refuse_lies(&bytes)?;
     let mut workbook: Xlsx<_> = Xlsx::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
     let mut room = Room::ALL;
@@ -163,7 +163,7 @@ fn of_workbook(data: &DataRef<'_>, room: &Room) -> Result<Option<SheetCell>, Too
 /// read.
 pub(super) fn csv_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String> {
     let mut room = Room::ALL;
-    let mut left = foreign::TABLE;
+    let mut left = untrusted_input::TABLE;
     let mut found = Tables::default();
     for entry in std::fs::read_dir(path).map_err(|error| told(&error))? {
         let file = entry.map_err(|error| told(&error))?.path();
@@ -176,7 +176,7 @@ pub(super) fn csv_tables(path: &Path, wanted: &[&str]) -> Result<Tables, String>
         }
         if wanted.contains(&sheet) {
             let of_file = |what: String| format!("{}: {what}", file.display());
-            let text = foreign::text(&file, left).map_err(|error| of_file(told(&error)))?;
+            let text = untrusted_input::text(&file, left).map_err(|error| of_file(told(&error)))?;
             left -= text.len() as u64;
             let table = csv_table(&text, &mut room).map_err(of_file)?;
             found.named.insert(sheet.to_string(), table);

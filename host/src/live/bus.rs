@@ -9,7 +9,7 @@ use tokio::sync::watch;
 
 use super::message::{Can, Message, Snapshot};
 use super::now::{Now, Shaker, State as Doing};
-use crate::outside::shown_json;
+use crate::untrusted_text::shown_json;
 
 /// Messages that are kept for late listeners; a listener that is further behind gets the complete
 /// state.

@@ -6,7 +6,7 @@
 //! results as [`found`], [`figures`] draws single records, [`averaging`] and [`spectra_figures`]
 //! their spectra, and [`numbers`] gives a number for each cell.
 //!
-//! What happens between two records is reported by the measuring process: [`eye`] queues the
+//! What happens between two records is reported by the measuring process: [`watcher`] queues the
 //! reports of its thread without ever blocking it; [`watching`] receives them, reads the stream
 //! through the tap, makes [`frames`] of it and, with [`turning`], the shaker's loop.
 //!
@@ -15,7 +15,6 @@
 
 pub mod averaging;
 pub mod bus;
-pub mod eye;
 pub mod figures;
 pub mod follow;
 pub mod forming;
@@ -23,4 +22,5 @@ pub mod frames;
 pub mod message;
 pub mod now;
 pub mod numbers;
+pub mod watcher;
 pub mod watching;

@@ -12,12 +12,12 @@ use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::Rows;
-use crate::outside::shown_json;
 use crate::report;
 use crate::report::figure::Figure;
 use crate::report::figure_fragment;
 use crate::report::words::brief;
 use crate::results::{Cells, MAIN_BAND, Results};
+use crate::untrusted_text::shown_json;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ pub struct CellNumbers {
 
 /// Data quality of one cell, from an analysis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CellHeard {
+pub struct CellQuality {
     configuration: String,
     impact: String,
     response: String,
@@ -51,8 +51,8 @@ pub struct CellHeard {
 }
 
 /// Extracts the data quality of every cell from the results.
-pub fn heard(found: &Cells) -> Vec<CellHeard> {
-    let one = found.cells.iter().map(|cell| CellHeard {
+pub fn cell_quality(found: &Cells) -> Vec<CellQuality> {
+    let one = found.cells.iter().map(|cell| CellQuality {
         configuration: cell.configuration.clone(),
         impact: cell.impact.clone(),
         response: cell.response.clone(),
@@ -68,7 +68,7 @@ pub fn of_cells(
     cells: &[CellRow],
     rows: &Rows,
     records: &[Result<RecordRow, Damaged>],
-    found: &[CellHeard],
+    found: &[CellQuality],
 ) -> Vec<CellNumbers> {
     let of_cell = |row: &CellRow| {
         let counts = |record: &&RecordRow| [Some(row.id), rows.lead(row.id)].contains(&Some(record.cell));
@@ -76,15 +76,15 @@ pub fn of_cells(
         let peaks: Vec<f64> = kept.map(|record| record.peak_n).filter(|peak| *peak > 0.0).collect();
         let mean = peaks.iter().sum::<f64>() / peaks.len() as f64;
         let name = configuration_name(row.cell.configuration);
-        let heard = found.iter().find(|own| {
+        let cell_quality = found.iter().find(|own| {
             own.configuration == name && own.impact == row.cell.impact && own.response == row.cell.response
         });
         CellNumbers {
             cell: row.id,
             force_n: (!peaks.is_empty()).then_some(mean),
             hits: peaks.len(),
-            random_error_percent: heard.and_then(|own| Some(100.0 * own.random_error?)),
-            coherence: heard.and_then(|own| own.coherence),
+            random_error_percent: cell_quality.and_then(|own| Some(100.0 * own.random_error?)),
+            coherence: cell_quality.and_then(|own| own.coherence),
         }
     };
     cells.iter().map(of_cell).collect()
@@ -104,7 +104,7 @@ pub struct Found {
     /// The estimate.
     pub estimate: Estimate,
     /// Data quality of each cell.
-    pub cells: Vec<CellHeard>,
+    pub cells: Vec<CellQuality>,
     /// All figures for which there are data, by name, as JSON for the page.
     pub figures: BTreeMap<String, String>,
 }
@@ -141,7 +141,7 @@ impl Found {
         };
         Found {
             estimate,
-            cells: results.cells.as_ref().map(heard).unwrap_or_default(),
+            cells: results.cells.as_ref().map(cell_quality).unwrap_or_default(),
             figures: figures.iter().map(|figure| (figure.name.to_owned(), drawn(figure))).collect(),
         }
     }
@@ -182,7 +182,7 @@ mod tests {
             random_error: (n != 2).then(|| 1e-3 * (n + 1) as f64),
         });
         let cells_found = Cells { frequency_hz: vec![100.0, 400.0, 900.0], cells: rows.collect() };
-        let numbers = of_cells(&cells, &Rows::default(), &[], &heard(&cells_found));
+        let numbers = of_cells(&cells, &Rows::default(), &[], &cell_quality(&cells_found));
         for (n, (own, row)) in numbers.iter().zip(&cells).enumerate() {
             assert_eq!((own.cell, own.force_n, own.hits), (row.id, None, 0));
             if n == 2 {

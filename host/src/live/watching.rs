@@ -5,10 +5,10 @@
 //! are computed from stored data.
 
 use super::bus::Bus;
-use super::eye::{Ear, WatchReport, room};
 use super::frames::Frames;
 use super::message::Message;
 use super::now::{Disk, Doing, Limit, Link, Shaker, Signals, State, StreamInfo};
+use super::watcher::{WatchQueue, WatchReport, room};
 use crate::campaign::plan::level::Level;
 use crate::campaign::run::shaking::record;
 use crate::campaign::store::record_table::Samples;
@@ -37,7 +37,7 @@ const DISK: Duration = Duration::from_secs(10);
 /// The thread's inputs and outputs.
 pub struct Watching {
     /// Reports of the measuring thread.
-    pub ear: Ear,
+    pub watch_queue: WatchQueue,
     /// The stream.
     pub view: View,
     /// Receives the messages.
@@ -105,7 +105,7 @@ impl Watching {
     fn hear(&self, known: &mut Known) {
         let (mut state, mut link) = (None, None);
         let mut shaker = false;
-        for told in self.ear.queue.try_iter() {
+        for told in self.watch_queue.queue.try_iter() {
             let mut now = |what, most_s, at: Option<(i64, u32, u32)>| {
                 let (cell, kept, attempt) = at.map_or((None, 0, 0), |(cell, kept, n)| (Some(cell), kept, n));
                 state = Some(State { what, since_unix_ms: unix_ms(), most_s, cell, kept, attempt });
@@ -162,7 +162,7 @@ impl Watching {
                 WatchReport::Ended => now(Doing::Ended, None, None),
             }
         }
-        if self.ear.cycles(&mut known.cycles) {
+        if self.watch_queue.cycles(&mut known.cycles) {
             known.turn();
             shaker = true;
         }

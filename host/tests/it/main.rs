@@ -5,7 +5,6 @@ mod averaged;
 mod between_arms;
 mod cmif;
 mod decoupling_reference;
-mod doors;
 mod explained;
 mod fit;
 mod hammer_slip;
@@ -23,6 +22,7 @@ mod shaker;
 #[cfg(feature = "sim")]
 mod simulated;
 mod spectra_reference;
+mod untrusted_files;
 mod verdict;
 mod verdict_reference;
 mod words;

@@ -9,7 +9,7 @@ use super::block::Block;
 use super::line::{Normal, Residual};
 use super::parameters::{COMPLIANCE, Parameters};
 use super::{ContactError, diagnosis};
-use crate::errors_in_variables::Feigned;
+use crate::errors_in_variables::NoiseInflation;
 use crate::frf::noise::shared_by_lines;
 use crate::parallel::prelude::*;
 use nalgebra::{DMatrix, DVector};
@@ -247,11 +247,12 @@ pub fn certainty(
     let (noise, _) = summed(blocks, of_noise.iter().map(|(block, normal)| (*block, normal)), p.len(), shared);
     let unit = units(information);
     let regular = scaled(information, &unit) + DMatrix::identity(unit.len(), unit.len()) * REGULAR;
-    let feigned = Feigned::of(regular, &scaled(&noise, &unit)).ok_or_else(ContactError::no_force)?;
+    let noise_inflation =
+        NoiseInflation::of(regular, &scaled(&noise, &unit)).ok_or_else(ContactError::no_force)?;
     let inverse = |power: i32| {
         let weight = |of_noise: f64| (1.0 - of_noise.clamp(0.0, MOSTLY_NOISE)).powi(-power);
         // the information is half of the curvature
-        scaled(&(0.5 * feigned.weighed(weight)), &unit)
+        scaled(&(0.5 * noise_inflation.weighed(weight)), &unit)
     };
     Ok(Certainty { answer: inverse(1), covariance: inverse(2) })
 }

@@ -14,7 +14,7 @@
 
 use super::record::{HysteresisRecord, Relative};
 use crate::spectra::CrossSpectra;
-use crate::spectra::record_transform::forward;
+use crate::spectra::fft::forward;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 

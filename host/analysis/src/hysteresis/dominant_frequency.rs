@@ -8,7 +8,7 @@
 //!
 //! Single lines of a spectrum by direct summation, and the phase factors used for it.
 
-use crate::spectra::record_transform::forward;
+use crate::spectra::fft::forward;
 use crate::vectors::wide;
 use num_complex::Complex;
 use pulp::NullaryFnOnce;

@@ -16,7 +16,7 @@
 //! The response to one hit per newton, line by line: the basis for comparing hits of different
 //! force.
 
-use crate::spectra::record_transform::forward;
+use crate::spectra::fft::forward;
 use num_complex::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;

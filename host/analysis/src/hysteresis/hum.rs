@@ -8,7 +8,7 @@ use super::dominant_frequency::{line_sum, turns};
 use super::finding::LoopFinding;
 use super::record::{HysteresisRecord, RelativeMotion};
 use crate::parallel::{join, prelude::*};
-use crate::spectra::record_transform::forward;
+use crate::spectra::fft::forward;
 use num_complex::Complex;
 use std::f64::consts::TAU;
 

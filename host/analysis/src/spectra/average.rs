@@ -3,12 +3,12 @@
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
+use super::fft::Order;
+use super::fft::Scratch;
+use super::fft::Windowed;
+use super::fft::{Lines, Put};
+use super::fft::{RecordTransform, check_finite};
 use super::jackknife;
-use super::record_transform::Lent;
-use super::record_transform::Order;
-use super::record_transform::Windowed;
-use super::record_transform::{Lines, Put};
-use super::record_transform::{RecordTransform, check_finite};
 use crate::parallel::{self, prelude::*};
 use crate::vectors::wide;
 use bytemuck::{cast_slice, cast_slice_mut};
@@ -46,16 +46,16 @@ pub struct SpectraAverage {
 
 /// A response and its sums, in reused buffers: they live as long as one cell's average.
 struct Output {
-    s_xf: Lent,
+    s_xf: Scratch,
     /// Two real numbers are stored in each complex one.
-    s_xx: Lent,
+    s_xx: Scratch,
     /// The lines of every hit, if hits are kept.
     kept: Vec<Vec<Complex<f64>>>,
 }
 
 impl Output {
     fn of(lines: usize) -> Self {
-        Output { s_xf: Lent::zeros(lines), s_xx: Lent::zeros(lines.div_ceil(2)), kept: Vec::new() }
+        Output { s_xf: Scratch::zeros(lines), s_xx: Scratch::zeros(lines.div_ceil(2)), kept: Vec::new() }
     }
 }
 
@@ -249,11 +249,11 @@ impl SpectraAverage {
     }
 
     /// The spectrum of a force, at all lines in the transform's order.
-    fn force_of(&self, force: &dyn Fn(&mut [f64])) -> Result<Lent, SpectraError> {
-        let mut windowed = Lent::of(self.samples.div_ceil(2));
+    fn force_of(&self, force: &dyn Fn(&mut [f64])) -> Result<Scratch, SpectraError> {
+        let mut windowed = Scratch::of(self.samples.div_ceil(2));
         let windowed: &mut [f64] = &mut cast_slice_mut(&mut windowed)[..self.samples];
         force(windowed);
-        let mut own = Lent::of(self.all.len());
+        let mut own = Scratch::of(self.all.len());
         let to = &mut Put { order: &self.all, out: &mut own };
         self.transform.transform(Windowed::plain(windowed), &self.all, to)?;
         Ok(own)

@@ -8,8 +8,8 @@
 use super::SpectraError;
 use super::average::SpectraAverage;
 use super::cross_spectra::CrossSpectra;
+use super::fft::Windowed;
 use super::pulse::Pulse;
-use super::record_transform::Windowed;
 use super::window::{Decay, PulseSamples, ResponseWeighting, Windowing};
 use crate::band::Band;
 use crate::frf::MotionQuantity;

@@ -186,7 +186,7 @@ fn a_hit_that_is_not_a_number_leaves_the_average_as_it_was() {
     // written directly into the transforms, so the hit is partly included and the average keeps
     // returning the error
     let response = [f64::INFINITY; 4];
-    let error = average.add_with(|f| f.fill(1.0), |_| record_transform::Windowed::plain(&response));
+    let error = average.add_with(|f| f.fill(1.0), |_| fft::Windowed::plain(&response));
     assert_eq!(error, Err(SpectraError::NotFinite { sample: 0 }));
     assert_eq!(average.finish(0.0, &[]), Err(SpectraError::NotFinite { sample: 0 }));
 }

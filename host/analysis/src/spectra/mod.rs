@@ -11,10 +11,10 @@
 pub mod average;
 pub mod cross_spectra;
 pub mod estimate;
+pub(crate) mod fft;
 pub mod jackknife;
 pub mod odd_hit;
 pub mod pulse;
-pub(crate) mod record_transform;
 pub mod window;
 
 pub use crate::frf::MotionQuantity;

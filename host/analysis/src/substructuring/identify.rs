@@ -7,10 +7,10 @@ use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, Measured};
 use super::joint_over_bands::{JointRow, JointSpectrum};
 use super::line_noise::LineNoise;
+use super::measured_set::MeasuredSet;
 use super::method::Method;
 pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, RefusedReason};
-use super::rooms::Rooms;
 use super::solve::{Solution, Solutions};
 use crate::band::Band;
 use crate::frf::common_lines::{self, CommonLines, OtherLines};
@@ -142,7 +142,7 @@ pub fn identify(
             });
         }
     }
-    let rooms = rooms(&files, geometry);
+    let measured_set = measured_set(&files, geometry);
     let mut out = Identification {
         joint: vec![],
         spectra: vec![],
@@ -151,10 +151,10 @@ pub fn identify(
         internals: vec![],
     };
     for &set in idms {
-        let reduced = Reduced::of(&rooms, set);
-        let (alone, solutions) = solve(&rooms, &reduced, set, methods, true);
+        let reduced = Reduced::of(&measured_set, set);
+        let (alone, solutions) = solve(&measured_set, &reduced, set, methods, true);
         if let (Ok(reduced), Some(alone)) = (&reduced, &alone) {
-            out.virtual_points.extend(reduced.quality(&rooms, [&alone[0], &alone[1]]));
+            out.virtual_points.extend(reduced.quality(&measured_set, [&alone[0], &alone[1]]));
         }
         let mut solved = Vec::new();
         for (method, solution) in solutions {
@@ -204,9 +204,9 @@ pub fn decouple(
 ) -> Result<Vec<(Method, Decoupled)>, IdentifyError> {
     check_alike(a, b, ajb)?;
     let files = [a, b, ajb].map(above_zero);
-    let rooms = rooms(&files, geometry);
-    let reduced = Reduced::of(&rooms, idms);
-    let (_, solutions) = solve(&rooms, &reduced, idms, methods, false);
+    let measured_set = measured_set(&files, geometry);
+    let reduced = Reduced::of(&measured_set, idms);
+    let (_, solutions) = solve(&measured_set, &reduced, idms, methods, false);
     Ok(solutions.into_iter().map(|(method, found)| (method, found.map(|solution| solution.z))).collect())
 }
 
@@ -228,12 +228,12 @@ pub fn line_noise(
     check_alike(a, b, ajb)?;
     let files = [a, b, ajb].map(above_zero);
     let [a, b, ajb] = files.each_ref().map(|frf| frf.smooth_variance());
-    let rooms = rooms(&files, geometry);
-    let reduced = Reduced::of(&rooms, idms);
+    let measured_set = measured_set(&files, geometry);
+    let reduced = Reduced::of(&measured_set, idms);
     let noise = |method| {
         let refused = |reason: String| Refused { method, idms: idms.count(), reason };
         let reduced = reduced.as_ref().map_err(|error| refused(error.to_string()))?;
-        reduced.line_noise(&rooms, [&a, &b, &ajb], method).map_err(|error| refused(error.to_string()))
+        reduced.line_noise(&measured_set, [&a, &b, &ajb], method).map_err(|error| refused(error.to_string()))
     };
     Ok(methods.iter().map(|&method| (method, noise(method))).collect())
 }
@@ -248,15 +248,15 @@ pub fn back_coupled(
 ) -> Option<BackCoupling> {
     check_alike(a, b, ajb).ok()?;
     let files = [a, b, ajb].map(above_zero);
-    let rooms = rooms(&files, geometry);
-    let reduced = Reduced::of(&rooms, idms).ok()?;
-    let solution = reduced.solve(&rooms, &[Method::Inverse], false).ok()?.by_method.pop()?.ok()?;
-    reduced.back_coupling(&rooms, &solution.z, band)
+    let measured_set = measured_set(&files, geometry);
+    let reduced = Reduced::of(&measured_set, idms).ok()?;
+    let solution = reduced.solve(&measured_set, &[Method::Inverse], false).ok()?.by_method.pop()?.ok()?;
+    reduced.back_coupling(&measured_set, &solution.z, band)
 }
 
-fn rooms<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Rooms<'a> {
+fn measured_set<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> MeasuredSet<'a> {
     let [a, b, ajb] = files;
-    Rooms {
+    MeasuredSet {
         a: Measured { file: Structure::A, frf: a, points: &geometry.a },
         b: Measured { file: Structure::B, frf: b, points: &geometry.b },
         ajb: Measured { file: Structure::Ajb, frf: ajb, points: &geometry.ajb },
@@ -269,7 +269,7 @@ type Solved = (Method, Result<Solution, Refused>);
 
 /// Every method's solution or refusal, and Y^A and Y^B if `alone` requests them and they exist.
 fn solve(
-    rooms: &Rooms<'_>,
+    measured_set: &MeasuredSet<'_>,
     reduced: &Result<Reduced, InterfaceError>,
     idms: IdmSet,
     methods: &[Method],
@@ -278,7 +278,7 @@ fn solve(
     let refused =
         |method, reason: RefusedReason| Refused { method, idms: idms.count(), reason: reason.to_string() };
     let solutions = match reduced {
-        Ok(reduced) => reduced.solve(rooms, methods, alone),
+        Ok(reduced) => reduced.solve(measured_set, methods, alone),
         Err(error) => Err(error.clone().into()),
     };
     match solutions {

@@ -4,7 +4,7 @@
 use super::geometry::Grouping;
 use super::interface_data::{Found, InterfaceError, Measured};
 use super::lanes::{Matrix, Pool, lines, minus, times, to_left_of};
-use super::rooms::{Balanced, Rooms, Side};
+use super::measured_set::{Balanced, MeasuredSet, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
 use pulp::Simd;
@@ -52,7 +52,7 @@ pub(super) struct Rearrangement<'a> {
     /// Columns in the file of `hit`, and the same in the assembly's file.
     pub(super) columns: Found,
     pub(super) columns_ajb: Found,
-    rooms: &'a Rooms<'a>,
+    measured_set: &'a MeasuredSet<'a>,
     pub(super) seen_at: &'a Balanced,
     pub(super) hit_at: &'a Balanced,
 }
@@ -63,38 +63,51 @@ impl<'a> Rearrangement<'a> {
         seen: Side,
         hit: Side,
         which: Which,
-        rooms: &'a Rooms<'a>,
+        measured_set: &'a MeasuredSet<'a>,
         at: [&'a Balanced; 2],
     ) -> Self {
         let (seen_on, hit_on) = (seen.responses(which), hit.impacts(which));
-        let (columns, columns_ajb) = shared(&rooms.alone(hit).inputs(hit_on), &rooms.ajb.inputs(hit_on));
-        let (rows, rows_ajb) = shared(&rooms.alone(seen).outputs(seen_on), &rooms.ajb.outputs(seen_on));
+        let (columns, columns_ajb) =
+            shared(&measured_set.alone(hit).inputs(hit_on), &measured_set.ajb.inputs(hit_on));
+        let (rows, rows_ajb) =
+            shared(&measured_set.alone(seen).outputs(seen_on), &measured_set.ajb.outputs(seen_on));
         let printed = which == Which::Printed;
         let [seen_at, hit_at] = [seen, hit].map(|side| at[side as usize]);
-        Rearrangement { seen, hit, printed, rows, rows_ajb, columns, columns_ajb, rooms, seen_at, hit_at }
+        Rearrangement {
+            seen,
+            hit,
+            printed,
+            rows,
+            rows_ajb,
+            columns,
+            columns_ajb,
+            measured_set,
+            seen_at,
+            hit_at,
+        }
     }
 
     /// P: from the virtual point to the internal responses (n_i × n_c).
     pub(super) fn p(&self, l: usize) -> Result<Line, InterfaceError> {
-        let cells = self.rooms.alone(self.seen).cells(l, &self.rows, &self.seen_at.vp.columns)?;
+        let cells = self.measured_set.alone(self.seen).cells(l, &self.rows, &self.seen_at.vp.columns)?;
         Ok(reduce_inputs(&cells, &self.seen_at.t_f))
     }
 
     /// Q: from the internal impacts to the virtual point (n_c × n_i).
     pub(super) fn q(&self, l: usize) -> Result<Line, InterfaceError> {
-        let file = self.rooms.alone(self.hit);
+        let file = self.measured_set.alone(self.hit);
         file.reduced_outputs(l, &self.hit_at.t_u, &self.hit_at.vp.rows, &self.columns)
     }
 
     /// P, M and Q of the lines of a vector.
-    pub(super) fn at_once<'p, S: Simd>(&self, pool: &'p Pool<S>, first: usize) -> [Matrix<'p, S>; 3] {
+    pub(super) fn batched<'p, S: Simd>(&self, pool: &'p Pool<S>, first: usize) -> [Matrix<'p, S>; 3] {
         let read = |file: Measured<'_>, rows: &Found, columns: &Found| {
             Matrix::read(pool, &lines(pool, file.frf.lines(), first), &rows.at, &columns.at)
         };
-        let (seen, hit) = (self.rooms.alone(self.seen), self.rooms.alone(self.hit));
+        let (seen, hit) = (self.measured_set.alone(self.seen), self.measured_set.alone(self.hit));
         let p = times(&read(seen, &self.rows, &self.seen_at.vp.columns), &self.seen_at.t_f);
         let q = to_left_of(&self.hit_at.t_u, &read(hit, &self.hit_at.vp.rows, &self.columns));
-        let assembled = read(self.rooms.ajb, &self.rows_ajb, &self.columns_ajb);
+        let assembled = read(self.measured_set.ajb, &self.rows_ajb, &self.columns_ajb);
         let m = if self.seen == self.hit {
             minus(read(seen, &self.rows, &self.columns), &assembled)
         } else {
@@ -106,9 +119,9 @@ impl<'a> Rearrangement<'a> {
     /// M: from the internal impacts to the internal responses in the assembly; if both are on one
     /// substructure, its value alone minus that in the assembly.
     pub(super) fn m(&self, l: usize) -> Result<Line, InterfaceError> {
-        let assembled = self.rooms.ajb.cells(l, &self.rows_ajb, &self.columns_ajb)?;
+        let assembled = self.measured_set.ajb.cells(l, &self.rows_ajb, &self.columns_ajb)?;
         if self.seen == self.hit {
-            Ok(self.rooms.alone(self.seen).cells(l, &self.rows, &self.columns)? - assembled)
+            Ok(self.measured_set.alone(self.seen).cells(l, &self.rows, &self.columns)? - assembled)
         } else {
             Ok(assembled)
         }

@@ -26,9 +26,9 @@
 //! is exact on s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are
 //! ordered x, y, z, rx, ry, rz.
 
-mod at_once;
 pub mod averaged;
 pub mod back_coupling;
+mod batched;
 pub mod between_arms;
 pub mod cmif;
 pub mod coupling;
@@ -46,12 +46,12 @@ mod internal_dofs;
 pub mod joint_over_bands;
 mod lanes;
 pub mod line_noise;
+mod measured_set;
 pub mod method;
 mod product;
 pub mod pseudo_inverse;
 pub mod quality;
 mod reduced;
-mod rooms;
 pub mod semm;
 mod solve;
 pub mod virtual_points;

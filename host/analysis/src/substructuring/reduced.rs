@@ -6,12 +6,12 @@ use super::geometry::Grouping;
 use super::idm::IdmSet;
 use super::interface_data::{InterfaceError, balance, scaled};
 use super::internal_dofs::Which;
+use super::measured_set::{Balanced, MeasuredSet, Side};
 use super::method::Method;
 use super::pseudo_inverse::full_rank_inverse;
 use super::quality::VirtualPointQuality;
 use super::quality::consistency;
 use super::quality::{passivity, reciprocity};
-use super::rooms::{Balanced, Rooms, Side};
 use crate::band::Band;
 use crate::parallel::prelude::*;
 use crate::structure::Structure;
@@ -80,17 +80,21 @@ pub(super) struct Reduced {
 }
 
 impl Reduced {
-    pub(super) fn of(rooms: &Rooms<'_>, idms: IdmSet) -> Result<Reduced, InterfaceError> {
-        let of = |file, grouping| Balanced::of(file, grouping, rooms.geometry, idms);
-        let (a, b) = (of(rooms.a, Grouping::InterfaceA)?, of(rooms.b, Grouping::InterfaceB)?);
-        let in_ajb = |grouping| of(rooms.ajb, grouping);
+    pub(super) fn of(measured_set: &MeasuredSet<'_>, idms: IdmSet) -> Result<Reduced, InterfaceError> {
+        let of = |file, grouping| Balanced::of(file, grouping, measured_set.geometry, idms);
+        let (a, b) = (of(measured_set.a, Grouping::InterfaceA)?, of(measured_set.b, Grouping::InterfaceB)?);
+        let in_ajb = |grouping| of(measured_set.ajb, grouping);
         let assembled = in_ajb(Grouping::InterfaceA).and_then(|a| Ok([a, in_ajb(Grouping::InterfaceB)?]));
         let (alone, assembly, impedance) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         Ok(Reduced { idms, a, b, assembled, alone, assembly, impedance })
     }
 
-    pub(super) fn quality(&self, rooms: &Rooms<'_>, [y_a, y_b]: [&[Line]; 2]) -> Vec<VirtualPointQuality> {
-        [(Structure::A, rooms.a, &self.a.vp, y_a), (Structure::B, rooms.b, &self.b.vp, y_b)]
+    pub(super) fn quality(
+        &self,
+        measured_set: &MeasuredSet<'_>,
+        [y_a, y_b]: [&[Line]; 2],
+    ) -> Vec<VirtualPointQuality> {
+        [(Structure::A, measured_set.a, &self.a.vp, y_a), (Structure::B, measured_set.b, &self.b.vp, y_b)]
             .into_par_iter()
             .filter_map(|(substructure, file, vp, y)| {
                 // factor from driving-point admittance to mobility
@@ -116,12 +120,17 @@ impl Reduced {
 
     /// How well A and B, coupled by this joint (mean over `band`), reproduce the measured assembly;
     /// none if it cannot be computed.
-    pub(super) fn back_coupling(&self, rooms: &Rooms<'_>, z: &[Line], band: Band) -> Option<BackCoupling> {
+    pub(super) fn back_coupling(
+        &self,
+        measured_set: &MeasuredSet<'_>,
+        z: &[Line],
+        band: Band,
+    ) -> Option<BackCoupling> {
         let d: Vec<f64> = balance(self.idms).iter().map(|d| 1.0 / d).collect();
         let z: Vec<Line> = z.par_iter().map(|z| scaled(z.clone(), &d, Complex::from(1.0))).collect();
-        let [y_a, y_b] = self.alone(rooms).ok()?;
-        let y = self.assembly(rooms).ok()?;
-        BackCoupling::of(rooms.a.frf, y_a, y_b, y, &z, band)
+        let [y_a, y_b] = self.alone(measured_set).ok()?;
+        let y = self.assembly(measured_set).ok()?;
+        BackCoupling::of(measured_set.a.frf, y_a, y_b, y, &z, band)
     }
 
     /// The virtual point of one substructure alone.
@@ -133,14 +142,21 @@ impl Reduced {
     }
 
     /// Y^A or Y^B at one line.
-    pub(super) fn alone_at(&self, rooms: &Rooms<'_>, side: Side, l: usize) -> Result<Line, InterfaceError> {
+    pub(super) fn alone_at(
+        &self,
+        measured_set: &MeasuredSet<'_>,
+        side: Side,
+        l: usize,
+    ) -> Result<Line, InterfaceError> {
         let own = self.own(side);
-        own.admittance(rooms.alone(side), l, own)
+        own.admittance(measured_set.alone(side), l, own)
     }
 
     /// Y^A and Y^B.
-    pub(super) fn alone(&self, rooms: &Rooms<'_>) -> Result<&[Vec<Line>; 2], RefusedReason> {
-        let of = |side| every_line(rooms.alone(side).frf.lines().len(), |l| self.alone_at(rooms, side, l));
+    pub(super) fn alone(&self, measured_set: &MeasuredSet<'_>) -> Result<&[Vec<Line>; 2], RefusedReason> {
+        let of = |side| {
+            every_line(measured_set.alone(side).frf.lines().len(), |l| self.alone_at(measured_set, side, l))
+        };
         let found = self.alone.get_or_init(|| Ok([of(Side::A)?, of(Side::B)?]));
         found.as_ref().map_err(Clone::clone)
     }
@@ -151,12 +167,16 @@ impl Reduced {
     }
 
     /// Y^AJB_cc at one line: both virtual points of the assembly, A's first.
-    pub(super) fn assembly_at(&self, rooms: &Rooms<'_>, l: usize) -> Result<Line, InterfaceError> {
+    pub(super) fn assembly_at(
+        &self,
+        measured_set: &MeasuredSet<'_>,
+        l: usize,
+    ) -> Result<Line, InterfaceError> {
         let (n, vp) = (self.idms.count(), self.assembled()?);
         let mut line = Line::zeros(2 * n, 2 * n);
         for (r, out) in vp.iter().enumerate() {
             for (c, input) in vp.iter().enumerate() {
-                let y = out.admittance(rooms.ajb, l, input)?;
+                let y = out.admittance(measured_set.ajb, l, input)?;
                 line.view_mut((r * n, c * n), (n, n)).copy_from(&y);
             }
         }
@@ -164,29 +184,38 @@ impl Reduced {
     }
 
     /// Y^AJB_cc.
-    pub(super) fn assembly(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
+    pub(super) fn assembly(&self, measured_set: &MeasuredSet<'_>) -> Result<&[Line], RefusedReason> {
         let found = self.assembly.get_or_init(|| {
             self.assembled()?;
-            every_line(rooms.ajb.frf.lines().len(), |l| Ok(self.assembly_at(rooms, l)?))
+            every_line(measured_set.ajb.frf.lines().len(), |l| Ok(self.assembly_at(measured_set, l)?))
         });
         found.as_deref().map_err(Clone::clone)
     }
 
     /// (Y^AJB_cc)⁻¹ at one line, with `y` = Y^AJB_cc.
-    pub(super) fn impedance_of(rooms: &Rooms<'_>, l: usize, y: &Line) -> Result<Line, RefusedReason> {
-        full_rank_inverse(y, ASSEMBLY).map_err(|lost| Self::refused(rooms, l, lost.into()))
+    pub(super) fn impedance_of(
+        measured_set: &MeasuredSet<'_>,
+        l: usize,
+        y: &Line,
+    ) -> Result<Line, RefusedReason> {
+        full_rank_inverse(y, ASSEMBLY).map_err(|lost| Self::refused(measured_set, l, lost.into()))
     }
 
     /// (Y^AJB_cc)⁻¹.
-    pub(super) fn impedance(&self, rooms: &Rooms<'_>) -> Result<&[Line], RefusedReason> {
-        let y = self.assembly(rooms)?;
-        let found =
-            self.impedance.get_or_init(|| every_line(y.len(), |l| Self::impedance_of(rooms, l, &y[l])));
+    pub(super) fn impedance(&self, measured_set: &MeasuredSet<'_>) -> Result<&[Line], RefusedReason> {
+        let y = self.assembly(measured_set)?;
+        let found = self
+            .impedance
+            .get_or_init(|| every_line(y.len(), |l| Self::impedance_of(measured_set, l, &y[l])));
         found.as_deref().map_err(Clone::clone)
     }
 
-    pub(super) fn refused(rooms: &Rooms<'_>, line: usize, source: DecouplingError) -> RefusedReason {
-        RefusedReason::Decoupling { frequency_hz: rooms.a.frf.frequency_hz()[line], source }
+    pub(super) fn refused(
+        measured_set: &MeasuredSet<'_>,
+        line: usize,
+        source: DecouplingError,
+    ) -> RefusedReason {
+        RefusedReason::Decoupling { frequency_hz: measured_set.a.frf.frequency_hz()[line], source }
     }
 }
 

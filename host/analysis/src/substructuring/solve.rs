@@ -2,15 +2,15 @@
 //!
 //! Z^J of one separate line by one method, for lines near rank loss or with a refusal.
 
-use super::at_once::{Job, LineResults};
+use super::batched::{Job, LineResults};
 use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
 use super::internal_dofs::Rearrangement;
+use super::measured_set::{MeasuredSet, Side};
 use super::method::Method;
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
 use super::reduced::{MethodKind, Reduced, RefusedReason};
-use super::rooms::{Rooms, Side};
 use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
@@ -44,14 +44,14 @@ impl Reduced {
     /// Y^A or Y^B contains a value that is not finite: then no method works.
     pub(super) fn solve(
         &self,
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         methods: &[Method],
         alone: bool,
     ) -> Result<Solutions, RefusedReason> {
         let plans: Vec<Result<MethodPlan<'_>, RefusedReason>> =
-            methods.iter().map(|&method| self.plan(rooms, method)).collect();
+            methods.iter().map(|&method| self.plan(measured_set, method)).collect();
         let works = plans.iter().flatten().map(|plan| &plan.work).collect();
-        let LineResults { alone, z } = Job { reduced: self, rooms, works, alone }.found()?;
+        let LineResults { alone, z } = Job { reduced: self, measured_set, works, alone }.found()?;
         let mut z = z.into_iter();
         let by_method = plans
             .into_iter()
@@ -64,11 +64,15 @@ impl Reduced {
         Ok(Solutions { alone, by_method })
     }
 
-    fn plan<'a>(&'a self, rooms: &'a Rooms<'a>, method: Method) -> Result<MethodPlan<'a>, RefusedReason> {
+    fn plan<'a>(
+        &'a self,
+        measured_set: &'a MeasuredSet<'a>,
+        method: Method,
+    ) -> Result<MethodPlan<'a>, RefusedReason> {
         let work = match MethodKind::from(method) {
             MethodKind::Internal(seen, hit, which) => {
-                let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
-                return self.with_internals(rooms, method, internals);
+                let internals = Rearrangement::of(seen, hit, which, measured_set, [&self.a, &self.b]);
+                return self.with_internals(measured_set, method, internals);
             }
             MethodKind::Interface => Work::Interface,
             MethodKind::Primal(block) => Work::Primal(block),
@@ -82,17 +86,17 @@ impl Reduced {
     /// the assembly, at the internals that both have.
     fn with_internals<'a>(
         &self,
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         name: Method,
         internals: Rearrangement<'a>,
     ) -> Result<MethodPlan<'a>, RefusedReason> {
         let mut notes = Vec::new();
         let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
         let n_c = self.idms.count();
-        let lines = rooms.a.frf.lines().len();
+        let lines = measured_set.a.frf.lines().len();
         if n_a.min(n_b) == 0 && lines > 0 {
             let source = DecouplingError::TooFewInternals { impacts: n_a, responses: n_b, needed: n_c };
-            return Err(Self::refused(rooms, 0, source));
+            return Err(Self::refused(measured_set, 0, source));
         }
         let found = if lines == 0 {
             None
@@ -104,7 +108,7 @@ impl Reduced {
                 idms: n_c,
                 impacts: n_a,
                 responses: n_b,
-                frequency_hz: rooms.ajb.frf.frequency_hz()[middle],
+                frequency_hz: measured_set.ajb.frf.frequency_hz()[middle],
                 rank_p: rank(&p),
                 rank_q: rank(&q),
                 condition_p: condition(&p),
@@ -153,15 +157,16 @@ impl Stage {
 
 impl Reduced {
     /// Z^J of one separate line, for lines near rank loss or with a refusal. Rotations in metres.
-    pub(super) fn with_care(
+    pub(super) fn per_line(
         &self,
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         work: &Work<'_>,
         l: usize,
     ) -> Result<Line, LineRefusal> {
-        let alone = |side| self.alone_at(rooms, side, l).map_err(Stage::Method.refuses());
-        let assembly = || self.assembly_at(rooms, l).map_err(Stage::Assembly.refuses());
-        let impedance = || Self::impedance_of(rooms, l, &assembly()?).map_err(Stage::Impedance.refuses());
+        let alone = |side| self.alone_at(measured_set, side, l).map_err(Stage::Method.refuses());
+        let assembly = || self.assembly_at(measured_set, l).map_err(Stage::Assembly.refuses());
+        let impedance =
+            || Self::impedance_of(measured_set, l, &assembly()?).map_err(Stage::Impedance.refuses());
         let found = match work {
             Work::Internals(internals) => {
                 let method = if internals.printed { internal_printed } else { internal };
@@ -183,6 +188,6 @@ impl Reduced {
             }
             Work::Inverse(block) => Ok(inverse_of(*block, &impedance()?)),
         };
-        found.map_err(|source| Stage::Method.refuses()(Self::refused(rooms, l, source)))
+        found.map_err(|source| Stage::Method.refuses()(Self::refused(measured_set, l, source)))
     }
 }

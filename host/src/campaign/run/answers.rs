@@ -70,7 +70,7 @@ impl Answers {
     }
 
     /// The answer to this question, if it has been given.
-    pub(super) fn heard(&self, question: Question) -> Option<Key> {
+    pub(super) fn answer_to(&self, question: Question) -> Option<Key> {
         self.queue().try_iter().find(|(about, _)| *about == question).map(|(_, key)| key)
     }
 
@@ -130,19 +130,19 @@ pub enum NotTaken {
 
 /// The end where edits are submitted.
 #[derive(Clone)]
-pub struct Desk(SyncSender<Request>);
+pub struct EditQueue(SyncSender<Request>);
 
 /// The end where edits are received, held by the writer of the campaign file.
 #[derive(Clone)]
 pub struct Edits(Arc<Mutex<Receiver<Request>>>);
 
 /// Creates both ends.
-pub fn edits() -> (Desk, Edits) {
+pub fn edits() -> (EditQueue, Edits) {
     let (to, from) = sync_channel(QUEUE);
-    (Desk(to), Edits(Arc::new(Mutex::new(from))))
+    (EditQueue(to), Edits(Arc::new(Mutex::new(from))))
 }
 
-impl Desk {
+impl EditQueue {
     /// Submits an edit; `tell` is called with its result on the writer's thread.
     ///
     /// # Errors
@@ -246,12 +246,12 @@ mod tests {
         let (asked, before) = (Question { cell: 4, attempt: 2 }, Question { cell: 4, attempt: 1 });
         assert!(answerer.give(before, Key::Accept));
         assert!(!answerer.give(asked, Key::Accept), "one at a time");
-        assert_eq!(answers.heard(asked), None, "it was about another attempt");
+        assert_eq!(answers.answer_to(asked), None, "it was about another attempt");
         assert!(answerer.give(asked, Key::Skip));
-        assert_eq!(answers.heard(asked), Some(Key::Skip));
+        assert_eq!(answers.answer_to(asked), Some(Key::Skip));
         assert!(answerer.give(asked, Key::Redo));
         answers.forget();
-        assert_eq!(answers.heard(asked), None);
+        assert_eq!(answers.answer_to(asked), None);
         drop(answers);
         assert!(!answerer.give(asked, Key::Accept));
     }
@@ -266,11 +266,11 @@ mod edits_tests {
     fn edits_wait_for_the_writer_and_no_more_than_a_few() {
         let folder = tempfile::tempdir().expect("a folder");
         let store = Store::create(&folder.path().join("a.jrig"), SMALL, "small.toml").expect("created");
-        let (desk, edits) = edits();
+        let (edit_queue, edits) = edits();
         let told = Arc::new(Mutex::new(Vec::new()));
         let hand_in = |edit: Edit| {
             let told = told.clone();
-            desk.hand_in(edit, move |what| told.lock().expect("whole").push(what))
+            edit_queue.hand_in(edit, move |what| told.lock().expect("whole").push(what))
         };
         for n in 0..QUEUE {
             assert_eq!(hand_in(Edit::Note(format!("note {n}"))), Ok(()));

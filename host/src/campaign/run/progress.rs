@@ -9,7 +9,7 @@ use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::session_table::ClockRow;
 use crate::campaign::watch::{Left, Seen, Watch};
-use crate::outside::{tell_line, visible};
+use crate::untrusted_text::{tell_line, visible};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
 use std::sync::{Mutex, MutexGuard, PoisonError};

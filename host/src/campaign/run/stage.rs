@@ -11,7 +11,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::device::address::Simulated;
 use crate::device::error::DeviceError;
 use crate::device::session::Session;
-use crate::outside::{tell, tell_line};
+use crate::untrusted_text::{tell, tell_line};
 use jointrig_protocol::answer::Info;
 use jointrig_protocol::request::Stage as StageRequest;
 use std::io::{BufRead, Write};
@@ -205,7 +205,7 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
     lines.try_iter().for_each(drop);
     tell(&format!("\n{what}\n{QUESTION}"));
     loop {
-        if let Some(key) = answers.heard(question) {
+        if let Some(key) = answers.answer_to(question) {
             tell_line!("answered on the page: {key:?}");
             return Ok(key);
         }

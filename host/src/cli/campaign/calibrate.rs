@@ -71,11 +71,8 @@ impl Calibrate {
 
 /// Reads a laboratory's calibration file.
 pub fn read(path: &Path) -> Result<Vec<SensorPlan>, CliError> {
-    let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
-        path: path.into(),
-        doing: "reading the calibration",
-        source,
-    })?;
+    let text = crate::untrusted_input::text(path, crate::untrusted_input::SETTINGS)
+        .map_err(|source| CliError::Read { path: path.into(), doing: "reading the calibration", source })?;
     let file = CalibrationFile::parse(&text, &path.display().to_string())?;
     Ok(file.channel.into_iter().map(toml::Spanned::into_inner).collect())
 }

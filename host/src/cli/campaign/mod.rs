@@ -13,7 +13,7 @@ use crate::advice::quoted;
 use crate::campaign::plan;
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Verdict;
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 

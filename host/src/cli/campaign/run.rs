@@ -20,7 +20,7 @@ use crate::cli::{measure, output};
 use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 
 /// Measure what is missing in a campaign.
 #[derive(Debug, Args)]

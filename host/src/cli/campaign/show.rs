@@ -15,8 +15,8 @@ use crate::campaign::store::record_table::Overrule;
 use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::cli::error::CliError;
 use crate::cli::output;
-use crate::outside::tell_line;
 use crate::report::cell_records::{Shown, records};
+use crate::untrusted_text::tell_line;
 
 /// Show a cell: its records, their verdicts, and a figure.
 #[derive(Debug, Args)]

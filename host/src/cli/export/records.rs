@@ -15,8 +15,8 @@ use crate::cli::error::CliError;
 use crate::cli::output::Waiting;
 use crate::exchange::channel_records::{self, ChannelRecords};
 use crate::exchange::{tables_output, uff_output, write_impacts};
-use crate::outside::file_name;
 use crate::spectra::{ImpactRecords, MotionQuantity};
+use crate::untrusted_text::file_name;
 
 /// Place of a record in its cell's file.
 pub(super) struct Written {

@@ -14,7 +14,7 @@ use crate::cli::output;
 use crate::cli::output::Waiting;
 use crate::exchange::StatedUnits;
 use crate::exchange::record_uff::{LabelledRecords, by_label, read_record_file, record_contents};
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 
 /// How files are named, and whether earlier records of a file with the same name are dropped.
 pub(super) struct Wishes<'w> {

@@ -20,8 +20,8 @@ use crate::campaign::verdict::Verdict;
 use crate::exchange::frf_npz::direction_arrays;
 use crate::exchange::{LabelledFrf, StatedUnits, read_frf_file, write_frf};
 use crate::frf::Frf;
-use crate::outside::tell_line;
 use crate::substructuring::geometry::Configuration as Points;
+use crate::untrusted_text::tell_line;
 use folder::Wishes;
 use records::CellName;
 

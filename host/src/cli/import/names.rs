@@ -9,8 +9,8 @@ use super::bad;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
 use crate::exchange::{delimiter, labelled_frf, record_uff};
-use crate::foreign;
-use crate::outside::file_name;
+use crate::untrusted_input;
+use crate::untrusted_text::file_name;
 
 /// Content of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<NamedFile>, 
             table.display()
         ))
     };
-    let text = foreign::text(table, foreign::TABLE).map_err(|source| CliError::Read {
+    let text = untrusted_input::text(table, untrusted_input::TABLE).map_err(|source| CliError::Read {
         path: table.into(),
         doing: "reading the table of names",
         source,

@@ -28,9 +28,9 @@ use crate::device::stream::Recording;
 use crate::exchange::StatedUnits;
 use crate::exchange::record_file::{PlannedPlace, RecordFile};
 use crate::exchange::record_uff::read_record_file;
-use crate::foreign;
-use crate::outside::tell_line;
 use crate::spectra::{Pulse, reversed_peak_n};
+use crate::untrusted_input;
+use crate::untrusted_text::tell_line;
 
 /// The cell that the records belong to.
 pub(super) struct CellName<'n> {
@@ -50,7 +50,7 @@ pub(super) struct RecordSource {
 impl RecordSource {
     pub(super) fn of(path: &Path, name: &str) -> Result<Self, CliError> {
         let failed = |source| CliError::Read { path: path.into(), doing: "reading a file to import", source };
-        let (mut file, size) = foreign::open(path).map_err(failed)?;
+        let (mut file, size) = untrusted_input::open(path).map_err(failed)?;
         let (mut digest, mut piece, mut read) = (Sha256::new(), vec![0; 1 << 16], 0u64);
         loop {
             let count = file.read(&mut piece).map_err(failed)?;

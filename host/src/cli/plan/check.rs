@@ -10,9 +10,9 @@ use crate::campaign::plan::{Plan, PlanError};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::plan::file;
-use crate::outside::tell_line;
 use crate::report::{self, Format};
 use crate::structure::Structure;
+use crate::untrusted_text::tell_line;
 
 /// List all errors of a plan and the results that it yields, and draw the positions of hammer and
 /// vibrometer.

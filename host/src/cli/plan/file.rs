@@ -9,10 +9,10 @@ use toml::Spanned;
 
 use crate::cli::error::CliError;
 use crate::exchange::read_positions;
-use crate::outside::tell_line;
 use crate::structure::Structure;
 use crate::substructuring::Geometry;
 use crate::substructuring::geometry::{Configuration, Point};
+use crate::untrusted_text::tell_line;
 
 /// Parts that are read before the text is parsed as a plan.
 #[derive(Deserialize)]
@@ -35,11 +35,8 @@ struct PeekGeometry {
 /// The plan or the workbook cannot be read, or the workbook contains something that a plan cannot
 /// represent.
 pub fn read(path: &Path) -> Result<String, CliError> {
-    let text = crate::foreign::text(path, crate::foreign::SETTINGS).map_err(|source| CliError::Read {
-        path: path.into(),
-        doing: "reading the plan",
-        source,
-    })?;
+    let text = crate::untrusted_input::text(path, crate::untrusted_input::SETTINGS)
+        .map_err(|source| CliError::Read { path: path.into(), doing: "reading the plan", source })?;
     // errors of the plan itself are reported when it is parsed as a plan
     let Ok(peek) = toml::from_str::<Peek>(&text) else { return Ok(text) };
     let Some(workbook) = peek.geometry.and_then(|geometry| geometry.workbook) else { return Ok(text) };

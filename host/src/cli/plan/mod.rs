@@ -5,7 +5,7 @@
 use super::error::CliError;
 use crate::advice::quoted;
 use crate::campaign::plan;
-use crate::outside::tell_line;
+use crate::untrusted_text::tell_line;
 use clap::{Args, Subcommand, ValueEnum};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write as _};

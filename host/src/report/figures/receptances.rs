@@ -37,9 +37,9 @@ pub fn receptances(results: &Results) -> Option<Figure> {
         "With phase and coherence as far as it is known, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is more than 6 dB down.",
     )
     .across(configurations.len());
-    let heard = indexed().any(|(_, c)| !c.coherence.is_empty());
+    let has_coherence = indexed().any(|(_, c)| !c.coherence.is_empty());
     for kind in [CurveKind::Magnitude, CurveKind::Phase, CurveKind::Coherence] {
-        if kind == CurveKind::Coherence && !heard {
+        if kind == CurveKind::Coherence && !has_coherence {
             continue;
         }
         for name in &configurations {

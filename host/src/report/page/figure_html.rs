@@ -2,9 +2,9 @@
 //! the page's script makes it interactive.
 
 use super::text::{Html, escaped};
-use crate::outside::shown_json;
 use crate::report::figure::{Figure, Height, Panel, Shape, role};
 use crate::report::svg;
+use crate::untrusted_text::shown_json;
 
 /// Width of the page's text, px; a full-width panel is drawn for it.
 const WIDE: f64 = 1040.0;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::outside::visible;
+use crate::untrusted_text::visible;
 
 /// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]

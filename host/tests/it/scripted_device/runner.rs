@@ -12,7 +12,7 @@ use crate::scripted_device::fake::Fake;
 use crate::scripted_device::faulty::{Faults, Faulty};
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::plan::{Cell, Plan};
-use jointrig::campaign::run::answers::{Desk, Edit, edits};
+use jointrig::campaign::run::answers::{Edit, EditQueue, edits};
 use jointrig::campaign::run::runner::RunError;
 use jointrig::campaign::run::runner::{Options, Summary, run};
 use jointrig::campaign::run::stage::Stage;
@@ -176,7 +176,7 @@ fn an_interrupted_campaign_resumes_to_the_same_records() {
 /// Judges as usual when all earlier records are stored, drops a good hit of the first cell once
 /// there are three, and records how many hits it is given.
 struct DropsOne {
-    desk: Option<Desk>,
+    edit_queue: Option<EditQueue>,
     path: PathBuf,
     judged: usize,
     given: Vec<usize>,
@@ -198,12 +198,12 @@ impl Judge for DropsOne {
         self.judged += 1;
         self.given.push(others.hits());
         if others.hits() == 3
-            && let Some(desk) = self.desk.take()
+            && let Some(edit_queue) = self.edit_queue.take()
         {
             let good = rows(&store).into_iter().find(RecordRow::kept).unwrap();
             let edit = Edit::Overrule { record: good.id, verdict: Verdict::Dropped, reason: "test".into() };
             let (tell, told) = channel();
-            desk.hand_in(edit, move |outcome| tell.send(outcome).unwrap()).unwrap();
+            edit_queue.hand_in(edit, move |outcome| tell.send(outcome).unwrap()).unwrap();
             told.recv().unwrap().unwrap();
         }
         ByShotSummary.judge(cell, plan, channels, recording, others)
@@ -215,9 +215,10 @@ fn a_hit_dropped_meanwhile_is_no_measure_for_those_after_it() {
     let folder = tempfile::tempdir().unwrap();
     let text = plan().replace("wanted = 2", "wanted = 8").replace("most = 8", "most = 30");
     let path = create(&folder, "a.jrig", &text);
-    let (desk, edits) = edits();
+    let (edit_queue, edits) = edits();
     let options = Options { edits: Some(edits), ..options() };
-    let mut judge = DropsOne { desk: Some(desk), path: path.clone(), judged: 0, given: Vec::new() };
+    let mut judge =
+        DropsOne { edit_queue: Some(edit_queue), path: path.clone(), judged: 0, given: Vec::new() };
     run_on(&path, Fake::default(), &options, &mut judge).unwrap();
     let store = Store::open_read_only(&path).unwrap();
     let first = store.cells().unwrap()[0].id;

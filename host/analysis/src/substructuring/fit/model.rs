@@ -12,7 +12,7 @@ use super::chart::{At, Chart};
 use super::problem::Problem;
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::joint_over_bands::median;
-use crate::substructuring::lanes::{Matrix, Pool, Sure, inverse, lines, minus, plus, product};
+use crate::substructuring::lanes::{Matrix, Pool, Reliable, inverse, lines, minus, plus, product};
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use crate::vectors::wide;
 use nalgebra::{Complex, DVector};
@@ -210,10 +210,10 @@ impl Predictions<'_> {
 
 /// H = (D W + E)⁻¹, and the lines at which it exists.
 fn held<'p, S: Simd>(pool: &Pool<S>, interface: &Matrix<'p, S>, lanes: usize) -> (Matrix<'p, S>, Vec<bool>) {
-    let mut sure = Sure::all(pool.simd);
-    let mut h = inverse(interface.copy(), &mut sure);
+    let mut reliable = Reliable::all(pool.simd);
+    let mut h = inverse(interface.copy(), &mut reliable);
     let regular = (0..lanes).map(|lane| {
-        sure.at(lane) || {
+        reliable.at(lane) || {
             let careful = full_rank_inverse(&interface.line(lane), "the interface with the joint");
             careful.map(|own| h.put_line(lane, &own)).is_ok()
         }

@@ -7,7 +7,7 @@ use super::factor::Factor;
 use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
-use crate::errors_in_variables::Feigned;
+use crate::errors_in_variables::NoiseInflation;
 use crate::parallel::{join, prelude::*};
 use nalgebra::{DMatrix, DVector};
 
@@ -226,11 +226,14 @@ impl Pass<'_> {
     fn corrected(&self, p: &DVector<f64>, at: &Score) -> Result<Option<Estimate>, FitError> {
         let count = p.len();
         let weight = self.linear.weight;
-        let all = self.products(self.linear.sums(|band| Ok(weight.bands[band].feigned.clone()))?).all;
+        let all = self.products(self.linear.sums(|band| Ok(weight.bands[band].noise_inflation.clone()))?).all;
         let pull = all.view((1, 0), (count, 1));
-        let feigned = all.view((1, 1), (count, count)).clone_owned();
-        let Some(feigned) = Feigned::of(at.hessian.clone(), &feigned) else { return Ok(None) };
-        let inverse = feigned.weighed(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
+        let noise_inflation = all.view((1, 1), (count, count)).clone_owned();
+        let Some(noise_inflation) = NoiseInflation::of(at.hessian.clone(), &noise_inflation) else {
+            return Ok(None);
+        };
+        let inverse =
+            noise_inflation.weighed(|f| if f < FEIGNED_MOST { 1.0 / (1.0 - f.max(0.0)) } else { 0.0 });
         let mut rest = &at.gradient - pull.column(0);
         for i in 0..count {
             if self.linear.chart.held(p, i, rest[i] > 0.0) {
@@ -238,7 +241,7 @@ impl Pass<'_> {
             }
         }
         let next = self.linear.chart.bounded(&(p + &inverse * rest));
-        let mut covariance = feigned.weighed(|f| {
+        let mut covariance = noise_inflation.weighed(|f| {
             let left = 1.0 - f.clamp(0.0, FEIGNED_MOST);
             1.0 / (left * left)
         });

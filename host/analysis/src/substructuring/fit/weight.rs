@@ -42,7 +42,7 @@ pub(super) struct BandWeight {
     ///
     /// J is evaluated at noisy Y^A and Y^B, so JᵀJ is too large by δJᵀδJ and Jᵀr by δJᵀδr: the
     /// estimate and its interval are corrected for both.
-    pub(super) feigned: DMatrix<f64>,
+    pub(super) noise_inflation: DMatrix<f64>,
 }
 
 /// G, the effect of the nuisance parameters.
@@ -185,11 +185,11 @@ impl Point<'_> {
         noise.add(&((plus.effect.written - minus.effect.written) * half));
         let whitening = noise.whitening().ok_or(FitError::NoiseSingular)?;
         let g = Whitened { written: whitening.of(here.written), aims: here.aims };
-        let mut feigned = (plus.model - minus.model) * half;
+        let mut noise_inflation = (plus.model - minus.model) * half;
         // what increases the model decreases the residual
-        feigned.column_mut(0).neg_mut();
-        let feigned = whitening.of(feigned);
-        Ok(BandWeight { whitening, g, feigned })
+        noise_inflation.column_mut(0).neg_mut();
+        let noise_inflation = whitening.of(noise_inflation);
+        Ok(BandWeight { whitening, g, noise_inflation })
     }
 }
 

@@ -2,14 +2,14 @@
 
 use super::super::pseudo_inverse::CLEAR;
 use super::matrix::Matrix;
-use super::number::{LaneCell, Lanes, Sure};
+use super::number::{LaneCell, Lanes, Reliable};
 use pulp::{NullaryFnOnce, Simd};
 
-pub(super) fn eliminated<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
+pub(super) fn eliminated<'p, S: Simd>(mut a: Matrix<'p, S>, reliable: &mut Reliable<S>) -> Matrix<'p, S> {
     let (simd, n) = (a.pool.simd, a.rows());
     let mut x = Matrix::any(a.pool, n, 1);
     let mut swaps = Vec::with_capacity(n);
-    simd.vectorize(Elimination { simd, n, a: a.cells_mut(), x: x.cells_mut(), swaps: &mut swaps, sure });
+    simd.vectorize(Elimination { simd, n, a: a.cells_mut(), x: x.cells_mut(), swaps: &mut swaps, reliable });
     a
 }
 
@@ -20,7 +20,7 @@ struct Elimination<'a, S: Simd> {
     /// The current column.
     x: &'a mut [LaneCell<S>],
     swaps: &'a mut Vec<Swap<S>>,
-    sure: &'a mut Sure<S>,
+    reliable: &'a mut Reliable<S>,
 }
 
 impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
@@ -29,7 +29,7 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        let Elimination { simd, n, a, x, swaps, sure } = self;
+        let Elimination { simd, n, a, x, swaps, reliable } = self;
         let (all, none) = (|value| Lanes::all(simd, value), Lanes::all(simd, 0.0));
         let mut largest = none;
         for k in 0..n {
@@ -41,8 +41,8 @@ impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
                 (row, pivot) = (all(r as f64).where_or(larger, row), size.where_or(larger, pivot));
             }
             largest = pivot.where_or(pivot.exceeds(largest), largest);
-            sure.only(pivot.exceeds(largest * all(CLEAR * CLEAR)));
-            sure.only(all(f64::INFINITY).exceeds(largest));
+            reliable.only(pivot.exceeds(largest * all(CLEAR * CLEAR)));
+            reliable.only(all(f64::INFINITY).exceeds(largest));
             let swap = Swap::of(simd, k, row);
             swap.in_column(column);
             // column k is overwritten by that of the inverse, which starts as the unit vector; −1

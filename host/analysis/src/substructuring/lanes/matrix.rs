@@ -1,6 +1,6 @@
 //! A matrix for each line, column-major.
 
-use super::number::{LaneCell, Lanes, Sure};
+use super::number::{LaneCell, Lanes, Reliable};
 use super::pool::Pool;
 use nalgebra::{Complex, DMatrix};
 use pulp::{NullaryFnOnce, Simd};
@@ -126,7 +126,7 @@ impl<'p, S: Simd> Matrix<'p, S> {
     }
 
     /// The lines at which all cells are finite.
-    pub(crate) fn finite(&self) -> Sure<S> {
+    pub(crate) fn finite(&self) -> Reliable<S> {
         let simd = self.pool.simd;
         simd.vectorize(Finite { simd, cells: &self.cells })
     }
@@ -263,20 +263,20 @@ struct Finite<'a, S: Simd> {
 }
 
 impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
-    type Output = Sure<S>;
+    type Output = Reliable<S>;
 
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
-    fn call(self) -> Sure<S> {
+    fn call(self) -> Reliable<S> {
         let none = Lanes::all(self.simd, 0.0);
         let mut sum = none;
         for cell in self.cells {
             // NaN or infinity times 0 is NaN
             sum = sum + (cell.re * none + cell.im * none);
         }
-        let mut sure = Sure::all(self.simd);
-        sure.only(sum.equals(none));
-        sure
+        let mut reliable = Reliable::all(self.simd);
+        reliable.only(sum.equals(none));
+        reliable
     }
 }
 

@@ -15,7 +15,7 @@ mod pool;
 mod product;
 
 pub(super) use matrix::{Matrix, lines};
-pub(super) use number::{LaneCell, Sure};
+pub(super) use number::{LaneCell, Reliable};
 pub(super) use pool::Pool;
 pub(super) use product::{minus, plus, product, times, to_left_of};
 
@@ -26,11 +26,11 @@ use std::cmp::Ordering;
 
 /// As [`full_rank_inverse`](super::pseudo_inverse::full_rank_inverse), at the lines whose rank is
 /// beyond doubt.
-pub(super) fn inverse<'p, S: Simd>(a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
+pub(super) fn inverse<'p, S: Simd>(a: Matrix<'p, S>, reliable: &mut Reliable<S>) -> Matrix<'p, S> {
     match a.rows().cmp(&a.columns()) {
-        Ordering::Equal => eliminated(a, sure),
-        Ordering::Greater => orthogonalised(a, sure),
-        Ordering::Less => orthogonalised(a.adjoint(), sure).adjoint(),
+        Ordering::Equal => eliminated(a, reliable),
+        Ordering::Greater => orthogonalised(a, reliable),
+        Ordering::Less => orthogonalised(a.adjoint(), reliable).adjoint(),
     }
 }
 

@@ -193,15 +193,15 @@ impl<S: Simd> Mul<Lanes<S>> for LaneCell<S> {
 /// The lines at which everything computed so far is reliable: finite, and inverted with a clear
 /// rank.
 #[derive(Clone, Copy)]
-pub(crate) struct Sure<S: Simd> {
+pub(crate) struct Reliable<S: Simd> {
     of: Lanes<S>,
 }
 
-impl<S: Simd> Sure<S> {
+impl<S: Simd> Reliable<S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     pub(crate) fn all(simd: S) -> Self {
-        Sure { of: Lanes::all(simd, 1.0) }
+        Reliable { of: Lanes::all(simd, 1.0) }
     }
 
     /// Restricts it to the lines where `mask` is true.

@@ -2,13 +2,13 @@
 
 use super::super::pseudo_inverse::CLEAR;
 use super::matrix::Matrix;
-use super::number::{LaneCell, Lanes, Sure};
+use super::number::{LaneCell, Lanes, Reliable};
 use pulp::{NullaryFnOnce, Simd};
 
-pub(super) fn orthogonalised<'p, S: Simd>(mut a: Matrix<'p, S>, sure: &mut Sure<S>) -> Matrix<'p, S> {
+pub(super) fn orthogonalised<'p, S: Simd>(mut a: Matrix<'p, S>, reliable: &mut Reliable<S>) -> Matrix<'p, S> {
     let (simd, m, n) = (a.pool.simd, a.rows(), a.columns());
     let mut r = Matrix::any(a.pool, n, n);
-    simd.vectorize(Orthogonalisation { simd, m, n, q: a.cells_mut(), r: r.cells_mut(), sure });
+    simd.vectorize(Orthogonalisation { simd, m, n, q: a.cells_mut(), r: r.cells_mut(), reliable });
     let mut inverse = a.adjoint();
     simd.vectorize(Substitution { n, x: inverse.cells_mut(), r: r.cells() });
     inverse
@@ -20,7 +20,7 @@ struct Orthogonalisation<'a, S: Simd> {
     n: usize,
     q: &'a mut [LaneCell<S>],
     r: &'a mut [LaneCell<S>],
-    sure: &'a mut Sure<S>,
+    reliable: &'a mut Reliable<S>,
 }
 
 impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
@@ -29,7 +29,7 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
     #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
     #[inline(always)]
     fn call(self) {
-        let Orthogonalisation { simd, m, n, q, r, sure } = self;
+        let Orthogonalisation { simd, m, n, q, r, reliable } = self;
         let all = |value| Lanes::all(simd, value);
         let none = LaneCell::all(simd, 0.0);
         let mut largest = all(0.0);
@@ -63,8 +63,8 @@ impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
                 at = all(0.5).exceeds(enough);
             }
             largest = square.where_or(square.exceeds(largest), largest);
-            sure.only(square.exceeds(largest * all(CLEAR * CLEAR)));
-            sure.only(all(f64::INFINITY).exceeds(largest));
+            reliable.only(square.exceeds(largest * all(CLEAR * CLEAR)));
+            reliable.only(all(f64::INFINITY).exceeds(largest));
             // the diagonal holds 1/Rₖₖ: multiplications instead of divisions
             let inverse = all(1.0).over(square.sqrt());
             r[k] = LaneCell { re: inverse, im: all(0.0) };

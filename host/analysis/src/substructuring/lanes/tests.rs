@@ -21,11 +21,11 @@ impl WithSimd for Inverses<'_> {
         let (rows, columns): (Vec<usize>, Vec<usize>) = ((0..rows).collect(), (0..columns).collect());
         let (pool, mut found) = (Pool::new(simd), Vec::new());
         while found.len() < self.0.len() {
-            let (first, mut sure) = (found.len(), Sure::all(simd));
+            let (first, mut reliable) = (found.len(), Reliable::all(simd));
             let a = Matrix::read(&pool, &lines(&pool, self.0, first), &rows, &columns);
-            let inverses = inverse(a, &mut sure);
+            let inverses = inverse(a, &mut reliable);
             let lanes = 0..S::F64_LANES.min(self.0.len() - first);
-            found.extend(lanes.map(|lane| sure.at(lane).then(|| inverses.line(lane))));
+            found.extend(lanes.map(|lane| reliable.at(lane).then(|| inverses.line(lane))));
         }
         found
     }

@@ -1,7 +1,7 @@
 //! The derivatives of Z_dd, as sums of dyads over the cells of measured blocks.
 
+use crate::substructuring::measured_set::{Balanced, Side};
 use crate::substructuring::product::product;
-use crate::substructuring::rooms::{Balanced, Side};
 use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix};
 use pulp::NullaryFnOnce;

@@ -18,11 +18,11 @@ use super::idm::Dof;
 use super::interface_data::balance;
 use super::internal_dofs::Rearrangement;
 use super::joint_over_bands::median;
+use super::measured_set::{MeasuredSet, Side};
 use super::method::Method;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
 use super::reduced::{MethodKind, Reduced, RefusedReason, every_line};
-use super::rooms::{Rooms, Side};
 use crate::band::Band;
 use dyads::{ASSEMBLED, Both, Dyads, MeasuredBlock, own};
 use nalgebra::{Complex, DMatrix};
@@ -47,50 +47,51 @@ impl Reduced {
     /// files' lines.
     pub(super) fn line_noise(
         &self,
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         noises: [&[DMatrix<f64>]; 3],
         method: Method,
     ) -> Result<LineNoise, RefusedReason> {
         let own = [own(Side::A, &self.a), own(Side::B, &self.b)];
-        let [y_a, y_b] = self.alone(rooms)?;
+        let [y_a, y_b] = self.alone(measured_set)?;
         let lines = y_a.len();
         let by_line: Result<Vec<Vec<[f64; 2]>>, RefusedReason> = match MethodKind::from(method) {
             MethodKind::Internal(seen, hit, which) => {
-                let internals = Rearrangement::of(seen, hit, which, rooms, [&self.a, &self.b]);
+                let internals = Rearrangement::of(seen, hit, which, measured_set, [&self.a, &self.b]);
                 let sources = Sources::of(&internals);
                 every_line(lines, |l| {
-                    let dyads = Self::by_internals(rooms, l, [&y_a[l], &y_b[l]], &internals, &sources, &own)?;
-                    Ok(self.deviations(rooms, noises, l, &dyads))
+                    let dyads =
+                        Self::by_internals(measured_set, l, [&y_a[l], &y_b[l]], &internals, &sources, &own)?;
+                    Ok(self.deviations(measured_set, noises, l, &dyads))
                 })
             }
             MethodKind::Interface => {
                 let both = Both::of(self.assembled()?);
-                let (both, y) = (both.source(), self.assembly(rooms)?);
+                let (both, y) = (both.source(), self.assembly(measured_set)?);
                 every_line(lines, |l| {
-                    let dyads = self.by_interface(rooms, l, [&y_a[l], &y_b[l], &y[l]], &both, &own)?;
-                    Ok(self.deviations(rooms, noises, l, &dyads))
+                    let dyads = self.by_interface(measured_set, l, [&y_a[l], &y_b[l], &y[l]], &both, &own)?;
+                    Ok(self.deviations(measured_set, noises, l, &dyads))
                 })
             }
             MethodKind::Primal(block) => {
                 let both = Both::of(self.assembled()?);
-                let (both, z) = (both.source(), self.impedance(rooms)?);
+                let (both, z) = (both.source(), self.impedance(measured_set)?);
                 let (at, y, own) = match block {
                     PrimalBlock::A => (0, y_a, &own[0]),
                     PrimalBlock::B => (self.idms.count(), y_b, &own[1]),
                 };
                 every_line(lines, |l| {
                     let alone = full_rank_inverse(&y[l], SUBSTRUCTURE)
-                        .map_err(|lost| Reduced::refused(rooms, l, lost.into()))?;
+                        .map_err(|lost| Reduced::refused(measured_set, l, lost.into()))?;
                     let mut dyads = Dyads::default();
                     let (row, column) = self.cross(&z[l], at, at);
                     dyads.linear(&both, &-row, &column);
                     dyads.linear(own, &alone, &alone);
-                    Ok(self.deviations(rooms, noises, l, &dyads))
+                    Ok(self.deviations(measured_set, noises, l, &dyads))
                 })
             }
             MethodKind::Inverse(block) => {
                 let both = Both::of(self.assembled()?);
-                let (both, z) = (both.source(), self.impedance(rooms)?);
+                let (both, z) = (both.source(), self.impedance(measured_set)?);
                 let n = self.idms.count();
                 let (at, other) = match block {
                     InverseBlock::Ab => (0, n),
@@ -100,7 +101,7 @@ impl Reduced {
                     let mut dyads = Dyads::default();
                     let (row, column) = self.cross(&z[l], at, other);
                     dyads.linear(&both, &row, &column);
-                    Ok(self.deviations(rooms, noises, l, &dyads))
+                    Ok(self.deviations(measured_set, noises, l, &dyads))
                 })
             }
         };
@@ -122,13 +123,13 @@ impl Reduced {
     /// Z = D⁻¹ − W⁻¹, where D = B Y^AJB Bᵀ.
     fn by_interface<'a>(
         &self,
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         l: usize,
         [y_a, y_b, y]: [&Line; 3],
         both: &'a MeasuredBlock<'a>,
         own: &'a [MeasuredBlock<'a>; 2],
     ) -> Result<Dyads<'a>, RefusedReason> {
-        let [d, w] = stiffnesses(y_a, y_b, y).map_err(refused(rooms, l))?;
+        let [d, w] = stiffnesses(y_a, y_b, y).map_err(refused(measured_set, l))?;
         let relative = boolean_difference(self.idms.count());
         let mut dyads = Dyads::default();
         dyads.linear(both, &-product(&d, &relative), &product(&relative.transpose(), &d));
@@ -140,7 +141,7 @@ impl Reduced {
 
     /// Z = (G − Y^A − Y^B)⁻¹ with G⁻¹ = P⁺ M Q⁺, or G = Q M⁻¹ P as printed.
     fn by_internals<'a>(
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         l: usize,
         [y_a, y_b]: [&Line; 2],
         internals: &Rearrangement<'_>,
@@ -150,7 +151,7 @@ impl Reduced {
         let (p, q, m) = (internals.p(l)?, internals.q(l)?, internals.m(l)?);
         let mut dyads = Dyads::default();
         let z = if internals.printed {
-            let [z, m_plus] = with_m_inverse(y_a, y_b, &p, &m, &q).map_err(refused(rooms, l))?;
+            let [z, m_plus] = with_m_inverse(y_a, y_b, &p, &m, &q).map_err(refused(measured_set, l))?;
             dyads.linear(&sources.q, &-&z, &product(&m_plus, &product(&p, &z)));
             for source in &sources.m {
                 dyads.inverse(source, &-product(&z, &q), [&m, &m_plus], &product(&p, &z));
@@ -159,7 +160,7 @@ impl Reduced {
             z
         } else {
             let Factors { p_plus, q_plus, g, z } =
-                factors(y_a, y_b, &p, &m, &q).map_err(refused(rooms, l))?;
+                factors(y_a, y_b, &p, &m, &q).map_err(refused(measured_set, l))?;
             let (left, right) = (product(&z, &g), product(&g, &z));
             let (to_m, from_m) = (product(&left, &p_plus), product(&q_plus, &right));
             dyads.inverse(&sources.p, &left, [&p, &p_plus], &product(&m, &from_m));
@@ -179,12 +180,12 @@ impl Reduced {
     /// after removing the files' quantity.
     fn deviations(
         &self,
-        rooms: &Rooms<'_>,
+        measured_set: &MeasuredSet<'_>,
         noises: [&[DMatrix<f64>]; 3],
         l: usize,
         dyads: &Dyads<'_>,
     ) -> Vec<[f64; 2]> {
-        let frf = rooms.a.frf;
+        let frf = measured_set.a.frf;
         let s = frf.s(l);
         let quantity = s.powi(frf.quantity().order_of_s());
         let variance = noises.map(|n| &n[l]);
@@ -194,8 +195,11 @@ impl Reduced {
     }
 }
 
-fn refused<'a>(rooms: &'a Rooms<'_>, l: usize) -> impl Fn(DecouplingError) -> RefusedReason + 'a {
-    move |source| Reduced::refused(rooms, l, source)
+fn refused<'a>(
+    measured_set: &'a MeasuredSet<'_>,
+    l: usize,
+) -> impl Fn(DecouplingError) -> RefusedReason + 'a {
+    move |source| Reduced::refused(measured_set, l, source)
 }
 
 /// The blocks that P, Q and M consist of.

@@ -4,9 +4,11 @@
 use super::decoupling::{InverseBlock, PrimalBlock};
 use super::interface_data::{balance, scaled};
 use super::internal_dofs::Rearrangement;
-use super::lanes::{LaneCell, Matrix, Pool, Sure, inverse, lines, minus, plus, product, times, to_left_of};
+use super::lanes::{
+    LaneCell, Matrix, Pool, Reliable, inverse, lines, minus, plus, product, times, to_left_of,
+};
+use super::measured_set::{MeasuredSet, Side};
 use super::reduced::{Reduced, RefusedReason};
-use super::rooms::{Rooms, Side};
 use super::solve::{LineRefusal, Work};
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
@@ -27,7 +29,7 @@ pub(super) struct LineResults {
 /// The requested results.
 pub(super) struct Job<'a> {
     pub(super) reduced: &'a Reduced,
-    pub(super) rooms: &'a Rooms<'a>,
+    pub(super) measured_set: &'a MeasuredSet<'a>,
     pub(super) works: Vec<&'a Work<'a>>,
     /// Whether Y^A and Y^B are requested too.
     pub(super) alone: bool,
@@ -39,13 +41,13 @@ impl Job<'_> {
     /// # Errors
     /// Y^A or Y^B contains a value that is not finite.
     pub(super) fn found(&self) -> Result<LineResults, RefusedReason> {
-        let lines = self.rooms.a.frf.lines().len();
+        let lines = self.measured_set.a.frf.lines().len();
         let places = |count| vec![vec![Line::zeros(0, 0); lines]; count];
         let (mut alone, mut z) = (places(if self.alone { 2 } else { 0 }), places(self.works.len()));
         let refused = wide(Into { job: self, alone: &mut alone, z: &mut z });
         for side in [Side::A, Side::B] {
             if let Some(l) = refused.iter().flat_map(|refused| &refused.alone[side as usize]).min() {
-                self.reduced.alone_at(self.rooms, side, *l)?;
+                self.reduced.alone_at(self.measured_set, side, *l)?;
             }
         }
         let mut z: Vec<Result<Vec<Line>, RefusedReason>> = z.into_iter().map(Ok).collect();
@@ -86,7 +88,7 @@ impl WithSimd for Into<'_> {
 
     fn with_simd<S: Simd>(self, simd: S) -> Vec<RefusedLines> {
         let lines = SHARE * S::F64_LANES;
-        let count = self.job.rooms.a.frf.lines().len().div_ceil(lines);
+        let count = self.job.measured_set.a.frf.lines().len().div_ceil(lines);
         let shares = |results| -> Vec<Places<'_>> {
             let mut shares: Vec<Places<'_>> = (0..count).map(|_| Vec::new()).collect();
             for result in results {
@@ -121,7 +123,7 @@ impl WithSimd for Into<'_> {
 }
 
 /// A matrix of each line, and the lines at which its rank is beyond doubt.
-type Surely<'p, S> = (Matrix<'p, S>, Sure<S>);
+type Surely<'p, S> = (Matrix<'p, S>, Reliable<S>);
 
 /// The lines of one vector.
 struct AtOnce<'a, S: Simd> {
@@ -139,12 +141,12 @@ struct AtOnce<'a, S: Simd> {
 
 impl<'a, S: Simd> AtOnce<'a, S> {
     fn of(pool: &'a Pool<S>, job: &'a Job<'a>, first: usize) -> Option<Self> {
-        let count = S::F64_LANES.min(job.rooms.a.frf.lines().len().checked_sub(first)?);
+        let count = S::F64_LANES.min(job.measured_set.a.frf.lines().len().checked_sub(first)?);
         if count == 0 {
             return None;
         }
         let alone = [Side::A, Side::B].map(|side| {
-            let (file, own) = (job.rooms.alone(side), job.reduced.own(side));
+            let (file, own) = (job.measured_set.alone(side), job.reduced.own(side));
             let lines = lines(pool, file.frf.lines(), first);
             let cells = Matrix::read(pool, &lines, &own.vp.rows.at, &own.vp.columns.at);
             times(&to_left_of(&own.t_u, &cells), &own.t_f)
@@ -154,8 +156,8 @@ impl<'a, S: Simd> AtOnce<'a, S> {
 
     /// Stores the results in the entries from `at` on.
     fn put(&self, at: usize, alone: &mut Places<'_>, z: &mut Places<'_>, refused: &mut RefusedLines) {
-        let Job { reduced, rooms, works, .. } = self.job;
-        let mut numbers = Sure::all(self.pool.simd);
+        let Job { reduced, measured_set, works, .. } = self.job;
+        let mut numbers = Reliable::all(self.pool.simd);
         for (y, refused) in self.alone.iter().zip(&mut refused.alone) {
             let finite = y.finite();
             numbers.and(finite);
@@ -165,21 +167,21 @@ impl<'a, S: Simd> AtOnce<'a, S> {
             (0..self.count).for_each(|lane| y.line_to(lane, &mut places[at + lane]));
         }
         let d = balance(reduced.idms);
-        let order = rooms.a.frf.quantity().order_of_s();
+        let order = measured_set.a.frf.quantity().order_of_s();
         let mut factor = LaneCell::all(self.pool.simd, 1.0);
         for lane in 0..self.count {
-            let Complex { re, im } = rooms.a.frf.s(self.first + lane).powi(order);
+            let Complex { re, im } = measured_set.a.frf.s(self.first + lane).powi(order);
             (factor.re.each_mut()[lane], factor.im.each_mut()[lane]) = (re, im);
         }
         for (w, (work, places)) in works.iter().zip(z).enumerate() {
-            let found = self.by(work).map(|(z, mut sure)| {
-                sure.and(numbers);
-                (z.scaled(&d, factor), sure)
+            let found = self.by(work).map(|(z, mut reliable)| {
+                reliable.and(numbers);
+                (z.scaled(&d, factor), reliable)
             });
             for (lane, place) in places[at..at + self.count].iter_mut().enumerate() {
                 match &found {
-                    Some((z, sure)) if sure.at(lane) => z.line_to(lane, place),
-                    _ => match reduced.with_care(rooms, work, self.first + lane) {
+                    Some((z, reliable)) if reliable.at(lane) => z.line_to(lane, place),
+                    _ => match reduced.per_line(measured_set, work, self.first + lane) {
                         Ok(z) => {
                             let factor = Complex::new(factor.re.each()[lane], factor.im.each()[lane]);
                             *place = scaled(z, &d, factor);
@@ -200,30 +202,30 @@ impl<'a, S: Simd> AtOnce<'a, S> {
             Work::Internals(internals) => self.by_internals(internals),
             Work::Interface => {
                 let y = self.assembly()?;
-                let mut sure = Sure::all(self.pool.simd);
+                let mut reliable = Reliable::all(self.pool.simd);
                 let block = |row: usize, column: usize| y.block((row * n, column * n), (n, n));
                 let d = minus(minus(block(0, 0), &block(0, 1)), &block(1, 0));
-                let d = inverse(plus(d, &block(1, 1)), &mut sure);
-                let w = inverse(plus(y_a.copy(), y_b), &mut sure);
-                Some((minus(d, &w), sure))
+                let d = inverse(plus(d, &block(1, 1)), &mut reliable);
+                let w = inverse(plus(y_a.copy(), y_b), &mut reliable);
+                Some((minus(d, &w), reliable))
             }
             Work::Primal(block) => {
-                let (z, sure) = self.impedance()?;
+                let (z, reliable) = self.impedance()?;
                 let (at, y) = match block {
                     PrimalBlock::A => (0, y_a),
                     PrimalBlock::B => (n, y_b),
                 };
-                let mut sure = *sure;
-                let alone = inverse(y.copy(), &mut sure);
-                Some((minus(z.block((at, at), (n, n)), &alone), sure))
+                let mut reliable = *reliable;
+                let alone = inverse(y.copy(), &mut reliable);
+                Some((minus(z.block((at, at), (n, n)), &alone), reliable))
             }
             Work::Inverse(block) => {
-                let (z, sure) = self.impedance()?;
+                let (z, reliable) = self.impedance()?;
                 let at = match block {
                     InverseBlock::Ab => (0, n),
                     InverseBlock::Ba => (n, 0),
                 };
-                Some((z.block(at, (n, n)).negated(), *sure))
+                Some((z.block(at, (n, n)).negated(), *reliable))
             }
         }
     }
@@ -231,28 +233,28 @@ impl<'a, S: Simd> AtOnce<'a, S> {
     fn by_internals(&self, internals: &Rearrangement<'_>) -> Option<Surely<'a, S>> {
         let n = self.job.reduced.idms.count();
         let [y_a, y_b] = &self.alone;
-        let mut sure = Sure::all(self.pool.simd);
+        let mut reliable = Reliable::all(self.pool.simd);
         let without = |g| minus(minus(g, y_a), y_b);
         if internals.printed {
-            let [p, m, q] = internals.at_once(self.pool, self.first);
-            let g = product(&product(&q, &inverse(m, &mut sure)), &p);
-            return Some((inverse(without(g), &mut sure), sure));
+            let [p, m, q] = internals.batched(self.pool, self.first);
+            let g = product(&product(&q, &inverse(m, &mut reliable)), &p);
+            return Some((inverse(without(g), &mut reliable), reliable));
         }
         if internals.rows.at.len().min(internals.columns.at.len()) < n {
             return None;
         }
-        let [p, m, q] = internals.at_once(self.pool, self.first);
-        let [p_plus, q_plus] = [p, q].map(|all| inverse(all, &mut sure));
-        let g = inverse(product(&product(&p_plus, &m), &q_plus), &mut sure);
-        Some((inverse(without(g), &mut sure), sure))
+        let [p, m, q] = internals.batched(self.pool, self.first);
+        let [p_plus, q_plus] = [p, q].map(|all| inverse(all, &mut reliable));
+        let g = inverse(product(&product(&p_plus, &m), &q_plus), &mut reliable);
+        Some((inverse(without(g), &mut reliable), reliable))
     }
 
     /// Y^AJB_cc; none if a virtual point cannot be formed.
     fn assembly(&self) -> Option<&Matrix<'a, S>> {
         let found = self.assembly.get_or_init(|| {
-            let Job { reduced, rooms, .. } = self.job;
+            let Job { reduced, measured_set, .. } = self.job;
             let vp = reduced.assembled().ok()?;
-            let lines = lines(self.pool, rooms.ajb.frf.lines(), self.first);
+            let lines = lines(self.pool, measured_set.ajb.frf.lines(), self.first);
             let n = reduced.idms.count();
             let mut y = Matrix::any(self.pool, 2 * n, 2 * n);
             for (r, out) in vp.iter().enumerate() {
@@ -269,9 +271,9 @@ impl<'a, S: Simd> AtOnce<'a, S> {
     /// (Y^AJB_cc)⁻¹.
     fn impedance(&self) -> Option<&Surely<'a, S>> {
         let found = self.impedance.get_or_init(|| {
-            let mut sure = Sure::all(self.pool.simd);
-            let z = inverse(self.assembly()?.copy(), &mut sure);
-            Some((z, sure))
+            let mut reliable = Reliable::all(self.pool.simd);
+            let z = inverse(self.assembly()?.copy(), &mut reliable);
+            Some((z, reliable))
         });
         found.as_ref()
     }

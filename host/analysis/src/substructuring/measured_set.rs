@@ -16,14 +16,14 @@ pub(super) enum Side {
 }
 
 /// The three measurements and the geometry.
-pub(super) struct Rooms<'a> {
+pub(super) struct MeasuredSet<'a> {
     pub(super) a: Measured<'a>,
     pub(super) b: Measured<'a>,
     pub(super) ajb: Measured<'a>,
     pub(super) geometry: &'a Geometry,
 }
 
-impl<'a> Rooms<'a> {
+impl<'a> MeasuredSet<'a> {
     /// The file of one substructure alone.
     pub(super) fn alone(&self, side: Side) -> Measured<'a> {
         match side {

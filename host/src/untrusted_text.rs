@@ -130,8 +130,8 @@ pub(crate) fn tell(text: &str) {
 
 /// Prints a line on stderr through [`tell`].
 macro_rules! tell_line {
-    () => { $crate::outside::tell("\n") };
-    ($($part:tt)*) => { $crate::outside::tell(&(format!($($part)*) + "\n")) };
+    () => { $crate::untrusted_text::tell("\n") };
+    ($($part:tt)*) => { $crate::untrusted_text::tell(&(format!($($part)*) + "\n")) };
 }
 pub(crate) use tell_line;
 

@@ -84,23 +84,23 @@ pub struct Cycles {
 }
 
 /// The sending end, used by the measuring thread.
-pub struct Eye {
+pub struct Watcher {
     queue: SyncSender<WatchReport>,
     cycles: Arc<Mutex<Cycles>>,
 }
 
 /// The receiving end.
-pub struct Ear {
+pub struct WatchQueue {
     /// The reports.
     pub queue: Receiver<WatchReport>,
     cycles: Arc<Mutex<Cycles>>,
 }
 
 /// Creates both ends.
-pub fn eye() -> (Eye, Ear) {
+pub fn watcher() -> (Watcher, WatchQueue) {
     let (to, from) = sync_channel(QUEUE);
     let cycles = Arc::new(Mutex::new(Cycles { codes: room(), fresh: false }));
-    (Eye { queue: to, cycles: cycles.clone() }, Ear { queue: from, cycles })
+    (Watcher { queue: to, cycles: cycles.clone() }, WatchQueue { queue: from, cycles })
 }
 
 /// A buffer for the cycles, allocated in advance so that the measuring thread never allocates.
@@ -108,7 +108,7 @@ pub fn room() -> Vec<i16> {
     Vec::with_capacity(MOST_CODES)
 }
 
-impl Ear {
+impl WatchQueue {
     /// Swaps the newest cycles with `own` if they have not been read yet; `own` should come from
     /// [`room`].
     pub fn cycles(&self, own: &mut Vec<i16>) -> bool {
@@ -121,7 +121,7 @@ impl Ear {
     }
 }
 
-impl Eye {
+impl Watcher {
     fn tell(&self, told: WatchReport) {
         // if the queue is full, a later report updates the page
         let _ = self.queue.try_send(told);
@@ -139,7 +139,7 @@ impl Eye {
     }
 }
 
-impl Watch for Eye {
+impl Watch for Watcher {
     fn saw(&self, seen: &Seen<'_>) {
         match *seen {
             Seen::Stream { channels, simulated } => {

@@ -4,7 +4,7 @@
 use crate::support;
 
 use jointrig_hil_sim::board::VirtualBoard;
-use jointrig_hil_sim::desk::{listen, obey};
+use jointrig_hil_sim::console::{listen, obey};
 use jointrig_protocol::event::Event;
 use support::SmallHost;
 

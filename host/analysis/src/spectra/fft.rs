@@ -116,8 +116,8 @@ impl RecordTransform {
         }
         let fft = &self.real.fft;
         let points = fft.len();
-        let mut scratch = Lent::of(fft.get_inplace_scratch_len());
-        let mut spectrum = Lent::of(points * if self.pieces.is_some() { PIECES } else { 1 });
+        let mut scratch = Scratch::of(fft.get_inplace_scratch_len());
+        let mut spectrum = Scratch::of(points * if self.pieces.is_some() { PIECES } else { 1 });
         if let Some(pieces) = &self.pieces {
             pieces.write(record, &mut spectrum);
         } else {
@@ -420,7 +420,7 @@ pub(super) struct Stretch {
 /// For a transform computed as a whole.
 const WHOLE: [Stretch; 1] = [Stretch { piece: 0, step: 1, mirrored: false }];
 
-/// For a transform computed in [pieces](super::record_transform).
+/// For a transform computed in [pieces](super::fft).
 const IN_PIECES: [Stretch; 2 * PIECES - 1] = {
     let zero = Stretch { piece: 0, step: PARTS / 2, mirrored: false };
     let mut all = [zero; 2 * PIECES - 1];
@@ -523,28 +523,28 @@ static IDLE: Mutex<Vec<Vec<C>>> = Mutex::new(Vec::new());
 const KEPT_AT_MOST: usize = 1 << 21;
 
 /// A buffer that returns to the pool when dropped. Its initial contents are arbitrary.
-pub(super) struct Lent(Vec<C>);
+pub(super) struct Scratch(Vec<C>);
 
-impl Lent {
+impl Scratch {
     /// A buffer of `count` numbers.
-    pub(super) fn of(count: usize) -> Lent {
+    pub(super) fn of(count: usize) -> Scratch {
         // the list is valid even after a poisoned lock
         let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
         let place = idle.iter().rposition(|piece| piece.len() == count);
         let piece = place.map(|place| idle.remove(place));
         drop(idle);
-        Lent(piece.unwrap_or_else(|| vec![C::default(); count]))
+        Scratch(piece.unwrap_or_else(|| vec![C::default(); count]))
     }
 
     /// A buffer of `count` zeros.
-    pub(super) fn zeros(count: usize) -> Lent {
-        let mut own = Lent::of(count);
+    pub(super) fn zeros(count: usize) -> Scratch {
+        let mut own = Scratch::of(count);
         own.fill(C::default());
         own
     }
 }
 
-impl Drop for Lent {
+impl Drop for Scratch {
     fn drop(&mut self) {
         let own = std::mem::take(&mut self.0);
         if own.is_empty() {
@@ -559,7 +559,7 @@ impl Drop for Lent {
     }
 }
 
-impl Deref for Lent {
+impl Deref for Scratch {
     type Target = [C];
 
     fn deref(&self) -> &[C] {
@@ -567,7 +567,7 @@ impl Deref for Lent {
     }
 }
 
-impl DerefMut for Lent {
+impl DerefMut for Scratch {
     fn deref_mut(&mut self) -> &mut [C] {
         &mut self.0
     }
@@ -818,16 +818,16 @@ mod lent_tests {
     #[test]
     fn memory_is_lent_again_and_only_so_much_of_it_kept() {
         let quarter = KEPT_AT_MOST / 4;
-        drop((0..9).map(|i| Lent::of(quarter + i)).collect::<Vec<_>>());
+        drop((0..9).map(|i| Scratch::of(quarter + i)).collect::<Vec<_>>());
         assert!(IDLE.lock().expect("whole").iter().map(Vec::len).sum::<usize>() <= KEPT_AT_MOST);
-        let piece = Lent::of(quarter + 100);
+        let piece = Scratch::of(quarter + 100);
         let place = piece.as_ptr();
         drop(piece);
         let lengths: Vec<usize> = IDLE.lock().expect("whole").iter().map(Vec::len).collect();
         assert!(lengths.contains(&(quarter + 100)), "{lengths:?}");
-        let again = Lent::of(quarter + 100);
+        let again = Scratch::of(quarter + 100);
         assert_eq!((again.len(), again.as_ptr()), (quarter + 100, place));
-        assert_eq!(Lent::of(0).len(), 0);
+        assert_eq!(Scratch::of(0).len(), 0);
     }
 }
 

@@ -12,7 +12,7 @@ const SHOWN_LINES: usize = 140;
 
 /// Data quality of all cells.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Heard {
+pub struct DataQuality {
     /// Frequencies at which coherence is reported, Hz: lines of the first cell, which all cells
     /// share.
     pub frequency_hz: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct Heard {
 pub struct HeardCell {
     /// The cell.
     pub name: CellName,
-    /// Coherence at [`Heard::frequency_hz`].
+    /// Coherence at [`DataQuality::frequency_hz`].
     pub coherence: Vec<f64>,
     /// Relative random error of the magnitude of H1: median over the main band; `None` with fewer
     /// than two hits.
@@ -44,9 +44,9 @@ fn shown(frequency_hz: &[f64]) -> Vec<usize> {
 }
 
 /// Data quality of all cells.
-pub fn heard(geometry: &Geometry, cells: &[CellAverage]) -> Heard {
+pub fn data_quality(geometry: &Geometry, cells: &[CellAverage]) -> DataQuality {
     let lines = cells.first().map_or(&[][..], |cell| cell.spectra.frequency_hz());
-    Heard {
+    DataQuality {
         frequency_hz: shown(lines).into_iter().map(|line| lines[line]).collect(),
         cells: cells.iter().map(|cell| one(geometry, cell)).collect(),
     }
