@@ -5,7 +5,6 @@
 //! board is half a ring ahead of the host's acknowledgement; so a run is bit-for-bit repeatable,
 //! however fast host and machine are.
 
-mod drive;
 mod parts;
 #[cfg(unix)]
 pub mod qemu;
@@ -28,7 +27,7 @@ use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 use crate::executor::{Poller, Polling, Woken, jump};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
-use drive::VirtualDrive;
+use parts::VirtualDrive;
 pub use parts::{Controls, Seen, Virtual};
 use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
 pub use sync::Wires;

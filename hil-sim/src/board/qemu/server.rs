@@ -27,7 +27,7 @@ use super::faults::Happening;
 use super::front_end::FrontEnd;
 use super::process::Pipes;
 use super::shared_ram::SharedRam;
-use crate::board::drive::VirtualDrive;
+use crate::board::parts::VirtualDrive;
 use crate::board::parts::{VirtualCoil, VirtualInputs, VirtualStage, describe, fill};
 use crate::board::sync::SyncPort;
 use crate::board::{Controls, Options, name, ring_slots};

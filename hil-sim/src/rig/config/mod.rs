@@ -5,7 +5,6 @@
 //! merge into the default's, its lists replace the default's lists.
 
 mod check;
-mod check_fixed;
 mod check_structure;
 mod contact;
 mod document;
