@@ -9,11 +9,11 @@ use nalgebra::DVector;
 
 use super::aim::shifted;
 use super::channels::{Channel, Measured};
+use super::code::code;
 use super::config::{FixedVibrometer, RigConfig};
+use super::delay_line::DelayLine;
 use super::key::{Stream, normal, stream};
 use super::probe::Probe;
-use super::sensors::DelayLine;
-use super::sensors::code;
 use super::unit_vector::normalized;
 
 /// Errors of one fixed vibrometer.

@@ -18,8 +18,10 @@
 mod aim;
 mod body;
 pub(crate) mod channels;
+mod code;
 pub mod config;
 mod configuration;
+mod delay_line;
 mod error;
 mod fixed;
 mod flaws;

@@ -3,8 +3,6 @@
 //! [`crate::report::document()`] converts them to `results.json`. The stages pass data to later
 //! stages as arguments; none reads what another stored here.
 //!
-//! Fits of K and C to all three configurations and their noise.
-//!
 //! The FRFs of one configuration of a campaign file, over any range of lines.
 
 use super::assemble::{everything, hits};
@@ -12,6 +10,7 @@ use super::averages::{Asked, CellAverage, CellSums};
 use super::cell::{CellName, Measurements};
 use super::contact_stage::Contact;
 use super::data_quality::DataQuality;
+use super::fits::{Fit, fits};
 use super::from_frfs::Substructured;
 use super::from_store::CampaignFile;
 use super::missing::Missing;
@@ -109,45 +108,6 @@ pub struct ImportedFrom {
     pub utc: String,
     /// Whether their variance came with them.
     pub with_variance: bool,
-}
-
-/// A requested fit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
-    /// Its interface deformation modes.
-    pub idms: IdmSet,
-    /// Its result.
-    pub outcome: Result<Fitted, NoFit>,
-}
-
-/// Why there is no fit.
-#[derive(Debug, Clone, PartialEq)]
-pub enum NoFit {
-    /// FRFs that were imported into the campaign came without their variance.
-    ImportWithoutVariance,
-    /// The file of this configuration has no variance.
-    FileWithoutVariance(Structure),
-    /// The fit failed.
-    Failed(FitError),
-}
-
-/// The fit with each set of modes over each band; the FRFs are those of A, B and AJB, with their
-/// variance.
-pub fn fits(
-    [a, b, ajb]: [&Frf; 3],
-    geometry: &Geometry,
-    sets: &[IdmSet],
-    bands: &[Band],
-    options: &Options,
-) -> Vec<Fit> {
-    let of = |idms: IdmSet, band: Band| {
-        let outcome = fit(a, b, ajb, geometry, idms, band, options).map_err(NoFit::Failed);
-        Fit { idms, outcome }
-    };
-    sets.iter()
-        .flat_map(|set| bands.iter().map(move |band| (*set, *band)))
-        .map(|(set, band)| of(set, band))
-        .collect()
 }
 
 impl CampaignFile {

@@ -17,7 +17,7 @@ use serde_json::json;
 use tokio::sync::oneshot;
 
 use super::Shared;
-use super::routes::Problem;
+use super::problem::Problem;
 use crate::campaign::run::answers::{Answerer, Key, Question};
 use crate::campaign::run::answers::{Edit, EditQueue, NotTaken};
 use crate::campaign::verdict::Verdict;

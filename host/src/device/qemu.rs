@@ -8,8 +8,8 @@ use std::time::Duration;
 use jointrig_hil_sim::board::qemu::QemuBoard;
 use jointrig_hil_sim::link::HostEnd;
 
-use super::address::Transport;
 use super::error::DeviceError;
+use super::transport::Transport;
 
 /// Environment variable with the path of the image, used if the address has none.
 pub const IMAGE_VARIABLE: &str = "JOINTRIG_MPS2_IMAGE";

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use serialport::{ErrorKind, SerialPort};
 
-use super::address::Transport;
 use super::error::{DeviceError, INSTALL_UDEV_RULE};
+use super::transport::Transport;
 
 /// Any rate works: USB serial ports ignore it.
 const BAUD: u32 = 921_600;

@@ -26,13 +26,13 @@ use jointrig_protocol::hello::{Hello, Mismatch};
 use jointrig_protocol::request::{Numbered, Request};
 use jointrig_protocol::shot::Shot;
 
-use super::address::{Simulated, Transport};
 use super::claims;
 use super::error::DeviceError;
 use super::inbox::Inbox;
 use super::link::Link;
 use super::logs::{DeviceLog, Tables};
 use super::stream::{Accounts, Stream};
+use super::transport::{Simulated, Transport};
 
 /// The line counts as idle when nothing arrived for this long.
 const IDLE: Duration = Duration::from_millis(20);

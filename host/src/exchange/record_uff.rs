@@ -16,7 +16,7 @@ use super::uff_axes::{
     Places, Sampling, Scale, UnitSystem, force_scale, motion_scale, time_scale, type_name, with_units,
 };
 use super::units::{Dimension, StatedUnits, Unit, told};
-use super::{FrfUffError, NpzError, frf_uff, labelled_frf};
+use super::{FrfUffError, NpzError, frf_file, frf_uff};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,7 +26,7 @@ use std::path::Path;
 pub enum RecordFileError {
     /// The file cannot be read, or has another program's format.
     #[error(transparent)]
-    Open(#[from] labelled_frf::FrfFileError),
+    Open(#[from] frf_file::FrfFileError),
     /// It is an npz file without impact records.
     #[error(transparent)]
     Npz(#[from] NpzError),
@@ -40,7 +40,7 @@ pub enum RecordFileError {
 /// # Errors
 /// [`RecordFileError`] with the file and what is wrong in it.
 pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile, RecordFileError> {
-    if labelled_frf::is_npz(path)? {
+    if frf_file::is_npz(path)? {
         return Ok(read_records(path, stated)?);
     }
     let contents = record_contents(path)?;
@@ -53,7 +53,7 @@ pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile,
 /// # Errors
 /// The file cannot be read, or has another program's format.
 pub fn record_contents(path: &Path) -> Result<Contents, RecordFileError> {
-    labelled_frf::refuse_other_formats(path, Wanted::Records)?;
+    frf_file::refuse_other_formats(path, Wanted::Records)?;
     Ok(frf_uff::contents(path)?)
 }
 

@@ -9,9 +9,9 @@
 
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
-use super::joint::{Reading, apart};
 use super::outcome::Interval;
 use super::parameters::{DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
+use super::reading::{Reading, apart};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N};
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;

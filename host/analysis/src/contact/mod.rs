@@ -36,6 +36,7 @@ mod block;
 mod cell;
 mod diagnosis;
 mod driven;
+mod form_scale;
 mod joint;
 mod levels;
 #[cfg(test)]
@@ -44,9 +45,11 @@ mod line;
 mod model;
 mod outcome;
 mod parameters;
+mod reading;
 mod solver;
 #[cfg(test)]
 mod tests;
+mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, SignalResidual};
@@ -228,7 +231,7 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
             "only {lines} lines of the hits on the assembly are numbers with a known noise in every cell"
         )));
     }
-    parameters::scale_form(&mut parameters, &blocks);
+    form_scale::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })

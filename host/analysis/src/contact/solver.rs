@@ -8,7 +8,7 @@
 use super::block::Block;
 use super::line::{Normal, Residual};
 use super::parameters::{COMPLIANCE, Parameters};
-use super::{ContactError, diagnosis};
+use super::{ContactError, unexplained};
 use crate::errors_in_variables::NoiseInflation;
 use crate::frf::noise::shared_by_lines;
 use crate::parallel::prelude::*;
@@ -80,7 +80,7 @@ pub fn solve(
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
             .collect();
-        if !diagnosis::widen(blocks, &left) {
+        if !unexplained::widen(blocks, &left) {
             break;
         }
         (here, settled) = Posterior { blocks, parameters, shared }.settle(here.p)?;

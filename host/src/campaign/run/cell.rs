@@ -8,7 +8,7 @@
 
 use super::answers::Question;
 use super::by_hand;
-use super::runner::RunError;
+use super::error::RunError;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
 use super::stage::{Moved, Stage, Who};

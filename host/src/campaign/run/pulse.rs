@@ -6,7 +6,7 @@
 //!
 //! Checks whether the device fits the plan, before anything moves.
 
-use super::runner::RunError;
+use super::error::RunError;
 use crate::campaign::plan::{Force, Plan};
 use crate::campaign::store::calibration_table::Calibration;
 use crate::device::channels::ChannelMap;

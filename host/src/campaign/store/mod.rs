@@ -39,7 +39,7 @@
 //! runner writes them from the rig's parameters; nothing of them crosses the protocol, and no
 //! estimator may read them.
 
-use crate::device::address::Simulated;
+use crate::device::transport::Simulated;
 use error::{StoreError, sqlite};
 use jointrig_protocol::answer::Info;
 use rusqlite::config::DbConfig;

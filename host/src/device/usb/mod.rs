@@ -16,8 +16,8 @@ use nusb::descriptors::{InterfaceDescriptor, TransferType};
 use nusb::transfer::{Buffer, Bulk, Direction, In, Out, TransferError};
 use nusb::{Device, Endpoint, ErrorKind, Interface, MaybeFuture};
 
-use super::address::Transport;
 use super::error::{DeviceError, INSTALL_UDEV_RULE};
+use super::transport::Transport;
 pub use attached::{Attached, attached};
 use queue::{Incoming, Queue, TRANSFER_BYTES, broken};
 

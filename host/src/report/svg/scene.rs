@@ -1,6 +1,4 @@
 //! A scene in space, seen from one side; the page can rotate it (`page/scene.js` draws the same).
-//!
-//! Maps a panel's values to positions on the drawing.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::marks;
@@ -99,14 +97,4 @@ fn corners_of(body: &Body) -> [[f64; 3]; 8] {
     std::array::from_fn(|i| {
         std::array::from_fn(|axis| if i >> axis & 1 == 1 { body.high[axis] } else { body.low[axis] })
     })
-}
-
-/// A panel with its frame and axes in pixels.
-pub struct PanelFrame {
-    /// The frame.
-    pub area: Area,
-    /// The horizontal axis.
-    pub x: Scale,
-    /// The vertical axis.
-    pub y: Scale,
 }

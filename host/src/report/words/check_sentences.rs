@@ -2,9 +2,10 @@
 
 use super::number::{decimals, micro, short};
 use crate::analyse::Findings;
+use crate::analyse::checks::contact_change::ContactChange;
 use crate::analyse::checks::{
-    BackCoupled, ContactChange, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness,
-    SeriesCompliance, Sizes, rigid_motions_suffice,
+    BackCoupled, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness, SeriesCompliance, Sizes,
+    rigid_motions_suffice,
 };
 use crate::hysteresis::compliance::ImaginaryPeak;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};

@@ -8,9 +8,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use jointrig::campaign::store::Store;
-use jointrig::device::address::Transport;
 use jointrig::device::error::DeviceError;
 use jointrig::device::session::Session;
+use jointrig::device::transport::Transport;
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::COIL_PULSE_CAP_US;
 

@@ -1,0 +1,43 @@
+//! Z^J of one separate line by one method, for lines near rank loss or with a refusal.
+
+use super::batched::{Job, LineResults};
+use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
+use super::decoupling::{interface, internal, internal_printed};
+use super::internal_dofs::Rearrangement;
+use super::measured_set::{MeasuredSet, Side};
+use super::method::Method;
+use super::pseudo_inverse::{condition, rank};
+use super::quality::Internals;
+use super::reduced::{MethodKind, Reduced, RefusedReason};
+use nalgebra::{Complex, DMatrix};
+
+type Line = DMatrix<Complex<f64>>;
+
+/// The operation that a method applies to a line.
+pub(super) enum Work<'a> {
+    Internals(Box<Rearrangement<'a>>),
+    Interface,
+    Primal(PrimalBlock),
+    Inverse(InverseBlock),
+}
+
+/// Order of the computation: each stage is done for all lines before the next, which decides the
+/// refusal that is reported.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Stage {
+    Assembly,
+    Impedance,
+    Method,
+}
+
+/// The refusal of a line.
+pub(super) struct LineRefusal {
+    pub(super) stage: Stage,
+    pub(super) reason: RefusedReason,
+}
+
+impl Stage {
+    pub(super) fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> LineRefusal {
+        move |reason| LineRefusal { stage: self, reason: reason.into() }
+    }
+}

@@ -1,0 +1,17 @@
+//! Maps a panel's values to positions on the drawing.
+
+use super::drawing::{Anchor, Area, Drawing, Stroke};
+use super::marks;
+
+use crate::report::figure::{Body, Marker, Scene};
+use crate::report::scale::Scale;
+
+/// A panel with its frame and axes in pixels.
+pub struct PanelFrame {
+    /// The frame.
+    pub area: Area,
+    /// The horizontal axis.
+    pub x: Scale,
+    /// The vertical axis.
+    pub y: Scale,
+}
