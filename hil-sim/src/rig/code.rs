@@ -1,16 +1,5 @@
 //! The converters: from a value in units of codes to the integer code.
 
-use super::channels::{CHANNELS, Channel, LOAD_CELLS, VIBROMETER};
-use super::config;
-use super::config::{Hammer, RigConfig};
-use super::delay_line::DelayLine;
-use super::flaws::Flaws;
-use super::force::ForceSegment;
-use super::hammer::nominal_width_s;
-use super::key::{Stream, normal, uniform};
-use num_complex::Complex;
-use std::f64::consts::PI;
-
 /// Rounded to the nearest code, saturating.
 #[inline]
 pub(super) fn code(exact: f64) -> i16 {

@@ -1,15 +1,5 @@
 //! Delays of channels, in whole scans and fractions of one.
 
-use super::channels::{CHANNELS, Channel, LOAD_CELLS, VIBROMETER};
-use super::config;
-use super::config::{Hammer, RigConfig};
-use super::flaws::Flaws;
-use super::force::ForceSegment;
-use super::hammer::nominal_width_s;
-use super::key::{Stream, normal, uniform};
-use num_complex::Complex;
-use std::f64::consts::PI;
-
 /// Delays a signal: cubic interpolation through the four samples around the delayed time.
 #[derive(Debug, Clone)]
 pub(super) struct DelayLine {

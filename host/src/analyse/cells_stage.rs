@@ -4,13 +4,12 @@
 //! band.
 
 use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
-use super::cell::{Cell, CellName, Hit, Measurements};
-use super::hammer_slip::{HitAtContact, of_hit, told};
+use super::cell::{Cell, CellName, Measurements};
+use super::hammer_slip::{HitAtContact, of_hit};
+use super::impact_loops;
 use super::impact_loops::ImpactLoop;
 use super::missing::Missing;
 use super::wanted::Progress;
-use super::{contact_stage, impact_loops};
-use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSignals};
 use crate::results::MAIN_BAND;
 use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
 use crate::structure::Structure;

@@ -2,15 +2,11 @@
 
 use super::assemble::component_of;
 use super::averages::CellAverage;
-use super::missing::Missing;
-use super::wanted::BANDS;
 use crate::frf::Frf;
-use crate::results::{Bootstrap, FrfCurve, MAIN_BAND, NoiseFloor, Role, rounded};
+use crate::results::{FrfCurve, NoiseFloor, Role, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
 use crate::substructuring::geometry::{Configuration, Grouping, Point};
-use crate::substructuring::{Geometry, IdmSet};
 use num_complex::Complex;
 
 /// The cell of this impact and channel, if it was measured.

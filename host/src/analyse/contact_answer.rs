@@ -1,32 +1,12 @@
 //! The contact stiffness: selects the cells used, and evaluates them together.
 
-use super::arm_from_hits::from_hits;
 use super::averages::CellAverage;
 use super::cell::{CellName, Measurements};
-use super::cells_stage::Cells;
-use super::checks::contact_change::ContactChange;
-use super::checks::{HiddenResonance, SeriesCompliance, at_the_specimens};
-use super::impact_loops::{ImpactLoop, ImpactLoops};
-use super::missing::Missing;
-use super::shaker_levels::RecordLoops;
-use super::specimen_curves::specimen_curves;
-use super::{cells_stage, chosen, impact_loops, shaker_levels};
 use crate::contact;
-use crate::contact::{BAND, ContactCell, ContactError, Input, Joint, Known, Stiffness, read};
-use crate::hysteresis::Correction;
-use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
-use crate::hysteresis::hammer_slip::HammerSlip;
-use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_known_force, from_levels};
-use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, Role, ShakerLoop, rounded};
+use crate::contact::{BAND, ContactCell, ContactError, Input, Known, Stiffness, read};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
-use crate::substructuring::direct::Direct;
-use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
-use crate::substructuring::idm::{Dof, IdmSet};
-use crate::substructuring::{BandStatistic, vpt};
-use nalgebra::Vector3;
-use num_complex::Complex;
-use std::f64::consts::TAU;
+use crate::substructuring::geometry::{Geometry, Grouping};
 
 /// Whether a cell is used for the estimate of the contact: arm B's interface from hits on B alone,
 /// and from the assembly arm B's interface and the specimens from hits along z on A or on the part

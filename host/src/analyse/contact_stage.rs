@@ -3,32 +3,26 @@
 
 use super::arm_from_hits::from_hits;
 use super::averages::CellAverage;
-use super::cell::{CellName, Measurements};
+use super::cell::Measurements;
 use super::cells_stage::Cells;
 use super::checks::contact_change::ContactChange;
 use super::checks::{HiddenResonance, SeriesCompliance, at_the_specimens};
-use super::contact_answer::cells;
 use super::impact_loops::{ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
 use super::specimen_curves::specimen_curves;
-use super::{cells_stage, chosen, impact_loops, shaker_levels};
-use crate::contact;
-use crate::contact::{BAND, ContactCell, ContactError, Input, Joint, Known, Stiffness, read};
+use super::{chosen, impact_loops, shaker_levels};
+use crate::contact::{ContactError, Joint, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
-use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_known_force, from_levels};
-use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, Role, ShakerLoop, rounded};
+use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_levels};
+use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
+use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
-use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
-use crate::substructuring::idm::{Dof, IdmSet};
-use crate::substructuring::{BandStatistic, vpt};
-use nalgebra::Vector3;
-use num_complex::Complex;
-use std::f64::consts::TAU;
+use crate::substructuring::geometry::{Geometry, Grouping};
 
 /// Number of groups of hits used to distinguish a resonance from noise.
 const GROUPS: usize = 4;

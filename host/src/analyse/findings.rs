@@ -10,7 +10,7 @@ use super::averages::{Asked, CellAverage, CellSums};
 use super::cell::{CellName, Measurements};
 use super::contact_stage::Contact;
 use super::data_quality::DataQuality;
-use super::fits::{Fit, fits};
+use super::fits::Fit;
 use super::from_frfs::Substructured;
 use super::from_store::CampaignFile;
 use super::missing::Missing;
@@ -21,10 +21,9 @@ use crate::results::{
 };
 use crate::spectra::Windowing;
 use crate::structure::Structure;
+use crate::substructuring::Frf;
 use crate::substructuring::averaged::{Averaged, Priors};
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
-use crate::substructuring::fit::{FitError, Fitted, Options, fit};
-use crate::substructuring::{Band, Frf, Geometry, IdmSet};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

@@ -26,7 +26,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
-use crate::results::{self, Calibrated, Cells, Completeness, HitRow, Source, rounded};
+use crate::results::{self, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;

@@ -1,22 +1,8 @@
 //! Collects every hit's response per newton, by cell, to detect whether the contact slips under the
 //! hammer.
 
-use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
-use super::cell::{Cell, CellName, Hit, Measurements};
-use super::cells_stage::of;
-use super::impact_loops::ImpactLoop;
-use super::missing::Missing;
-use super::wanted::Progress;
-use super::{contact_stage, impact_loops};
+use super::cell::{CellName, Hit};
 use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSignals};
-use crate::results::MAIN_BAND;
-use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
-use crate::structure::Structure;
-use crate::substructuring::averaged;
-use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
-use num_complex::Complex;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The response per newton of one hit that moves the contact.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,20 +4,11 @@
 use super::averages::CellAverage;
 use super::cell::{Measurements, ShakerLevel};
 use super::contact_answer::{cells, input};
-use super::missing::Missing;
-use crate::campaign::plan::level::Moment;
 use crate::contact::{
     ContactError, Joint, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, joint, level_stiffness,
 };
-use crate::hysteresis::backbone::Law;
-use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
-use crate::hysteresis::cycles::open_record;
-use crate::hysteresis::static_arm::{Identified, Tones};
-use crate::hysteresis::{
-    HysteresisRecord, LoopAnalysis, LoopFinding, RelativeMotion, Shape, analyse, analyse_both,
-    analyse_corrected,
-};
-use crate::results::{Backbone, ShakerLoop, rounded};
+use crate::hysteresis::static_arm::Tones;
+use crate::hysteresis::{LoopAnalysis, LoopFinding, Shape};
 
 /// Number of stretches of a record whose scatter gives its noise: enough to determine a standard
 /// deviation to a quarter.

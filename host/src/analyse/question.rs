@@ -1,11 +1,10 @@
 //! Identification from FRFs of any source: the requests of `jointrig identify` and of the Python
 //! module, and their results.
 
-use super::cell::KnownContact;
 use super::fits::{Fit, NoFit, fits};
 use super::wanted::BANDS;
 use super::{Findings, Missing, Substructured};
-use crate::results::{Joint, MAIN_BAND, Results, Source};
+use crate::results::{Joint, Results, Source};
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::{

@@ -1,17 +1,11 @@
 //! The estimates to quote, and the bootstrap over hits if it was requested.
 
-use super::assemble::component_of;
-use super::averages::CellAverage;
 use super::missing::Missing;
 use super::wanted::BANDS;
 use crate::frf::Frf;
-use crate::results::{Bootstrap, FrfCurve, MAIN_BAND, NoiseFloor, Role, rounded};
-use crate::spectra::MotionQuantity;
-use crate::structure::Structure;
+use crate::results::{Bootstrap, MAIN_BAND};
 use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
-use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use crate::substructuring::{Geometry, IdmSet};
-use num_complex::Complex;
 
 /// Seed of the bootstrap; fixed, so that the same file gives the same figures.
 const SEED: u64 = 1;

@@ -1,22 +1,16 @@
 //! The shaker's levels: each level's loop with the raw and the corrected force, an example loop,
 //! the law over amplitude.
 
-use super::averages::CellAverage;
-use super::cell::{Measurements, ShakerLevel};
-use super::contact_answer::{cells, input};
-use super::level_stiffness::{LevelOutcome, of};
+use super::cell::ShakerLevel;
+use super::level_stiffness::LevelOutcome;
 use super::missing::Missing;
 use crate::campaign::plan::level::Moment;
-use crate::contact::{
-    ContactError, Joint, Known, LevelError, LevelStiffness, SteadyLevel, Stiffness, joint, level_stiffness,
-};
 use crate::hysteresis::backbone::Law;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::cycles::open_record;
 use crate::hysteresis::static_arm::{Identified, Tones};
 use crate::hysteresis::{
-    HysteresisRecord, LoopAnalysis, LoopFinding, RelativeMotion, Shape, analyse, analyse_both,
-    analyse_corrected,
+    HysteresisRecord, LoopAnalysis, RelativeMotion, Shape, analyse, analyse_both, analyse_corrected,
 };
 use crate::results::{Backbone, ShakerLoop, rounded};
 

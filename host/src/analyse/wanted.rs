@@ -1,16 +1,8 @@
 //! Options of an analysis, and its progress.
 
 use super::cell::KnownContact;
-use super::fits::{Fit, NoFit, fits};
-use super::{Findings, Missing, Substructured};
-use crate::results::{Joint, MAIN_BAND, Results, Source};
-use crate::structure::Structure;
-use crate::substructuring::averaged::{Priors, averaged};
-use crate::substructuring::{
-    Band, Dof, Frf, Geometry, IdentifyError, IdmSet, Method, fit, identify, keep_common_lines,
-};
-use std::collections::BTreeMap;
-use std::str::FromStr;
+use crate::results::MAIN_BAND;
+use crate::substructuring::Band;
 
 /// The bands over which means are computed, Hz; the first is the main one.
 pub const BANDS: [Band; 3] =

@@ -1,22 +1,11 @@
 //! Error responses: what is wrong, where, and what to do.
 
-use super::guard::{Refusal, from_here, token};
-use super::{Shared, edit, page, server};
-use crate::campaign::store::Store;
+use super::guard::Refusal;
 use crate::campaign::store::error::StoreError;
-use crate::live::numbers::drawn;
-use crate::live::{figures, numbers};
-use crate::report::figure;
-use crate::report::figure::Figure;
-use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::Json;
+use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
-use axum::{Json, Router};
-use serde::Deserialize;
 use serde_json::json;
-use std::sync::Arc;
 
 /// Why a request could not be answered.
 pub struct Problem {

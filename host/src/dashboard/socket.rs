@@ -2,20 +2,14 @@
 //! and reports how many of its frames it has received; at most [`UNREAD`] frames are under way,
 //! however large the buffers in between are.
 
-use super::{Shared, routes};
+use super::Shared;
 use crate::live::frames::Looker;
 use axum::extract::State;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::response::Response;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use hyper_util::service::TowerToHyperService;
 use serde::Deserialize;
-use std::io;
-use std::net::TcpListener;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use tokio::sync::Semaphore;
 use tokio::time::{Instant, timeout, timeout_at};
 
 /// Largest message from a page, bytes.

@@ -1,18 +1,8 @@
 //! Byte transport to and from a device.
 
-use super::error::DeviceError;
-use base64::Engine as _;
-use base64::prelude::BASE64_STANDARD;
-use jointrig_hil_sim::board::{Options, VirtualBoard};
-use jointrig_hil_sim::link::HostEnd;
-use jointrig_hil_sim::rig::RigConfig;
-use sha2::{Digest, Sha256};
-use std::io::{Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::io;
+use std::path::Path;
 use std::time::Duration;
-use std::{fmt, io};
 
 /// A byte pipe to one device. It does not preserve frames: bytes may arrive in pieces of any size,
 /// and may be lost.

@@ -7,8 +7,6 @@ use super::labelled_frf::LabelledFrf;
 use super::npz::NpzError;
 use super::other_formats::{Contents, not_read_here};
 use super::units::StatedUnits;
-use crate::frf::Frf;
-use crate::substructuring::geometry::{Configuration, Point};
 use crate::{advice, untrusted_input};
 use std::io;
 use std::io::Read;

@@ -5,17 +5,8 @@
 //! direction; this module compares it with the direction that a plan or a geometry gives for the
 //! same point.
 
-use super::frf_npz::read_labelled;
-use super::frf_uff::{FrfUffError, read_frf_uff};
-use super::npz::NpzError;
-use super::other_formats::{Contents, not_read_here};
-use super::units::StatedUnits;
 use crate::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
-use crate::{advice, untrusted_input};
-use std::io;
-use std::io::Read;
-use std::path::{Path, PathBuf};
 
 /// The label of an output or an input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

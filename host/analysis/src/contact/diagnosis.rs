@@ -10,7 +10,6 @@
 //! and stays a doubt.
 
 use super::block::Block;
-use super::line::Residual;
 use super::parameters::{COMPLIANCE, Cause, Parameters};
 use super::solver::{BIN_HZ, Bin, Solution};
 use crate::band::Band;

@@ -3,8 +3,6 @@
 
 use super::block::{Block, Group};
 use super::parameters::{FORM, Parameters};
-use crate::substructuring::averaged::Priors as Positions;
-use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Stiffness parallel to the load cells, relative to theirs, K = |T/z_B|.

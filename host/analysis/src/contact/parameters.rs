@@ -3,10 +3,8 @@
 //!
 //! Prior standard deviations of positions, angles, gains and delays.
 
-use super::block::{Block, Group};
 use crate::substructuring::averaged::Priors as Positions;
 use serde::Serialize;
-use std::f64::consts::TAU;
 
 /// 1/k_T, m/N.
 pub const COMPLIANCE: usize = 0;

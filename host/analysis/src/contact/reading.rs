@@ -1,12 +1,8 @@
 //! One reading of the contact's compliance: its value and its uncertainties.
 
-use super::driven::REACH_HZ;
-use super::levels::LevelStiffness;
-use super::outcome::{Interval, Variances, stiffness_of};
-use super::parameters::{COMPLIANCE, Cause};
-use super::{Known, Stiffness};
-use nalgebra::{DMatrix, DVector};
-use std::collections::BTreeMap;
+use super::Known;
+use super::parameters::COMPLIANCE;
+use nalgebra::DVector;
 
 /// A level's compliance, its dependence on the parameters of the hits' fit, and its other
 /// uncertainties.

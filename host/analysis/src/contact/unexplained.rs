@@ -7,14 +7,7 @@
 //! same.
 
 use super::block::Block;
-use super::diagnosis::part;
 use super::line::Residual;
-use super::parameters::{COMPLIANCE, Cause, Parameters};
-use super::solver::{BIN_HZ, Bin, Solution};
-use crate::band::Band;
-use crate::substructuring::geometry::Grouping;
-use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 
 /// χ² per degree of freedom above which the noise does not explain the residuals of a cell. A cell
 /// has about fifty degrees of freedom, so its χ² scatters by 0.2.

@@ -4,15 +4,13 @@ use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::dominant_frequency::dominant_frequency;
 use super::finding::LoopFinding;
-use super::impact::{Decay, DecayCycle, FIRST_CYCLES, decay};
+use super::impact::{Decay, FIRST_CYCLES, decay};
 use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{OverCycles, swing};
 use super::record::{HysteresisRecord, Relative};
-use super::shape::{Shape, ShapeEvidence};
+use super::shape::Shape;
 use super::static_arm::Correction;
 use super::steady::shaker;
-use num_complex::Complex;
-use serde::Serialize;
 
 /// A record without an excitation frequency counts as steady when the strength of its last quarter
 /// is at least this fraction of that of its first.

@@ -1,17 +1,5 @@
 //! One closed cycle of a record.
 
-use super::HysteresisError;
-use super::loops::{energy, swing};
-use super::record::{HysteresisRecord, RelativeMotion};
-use super::static_arm::Correction;
-use super::timing::Timing;
-use crate::parallel::prelude::*;
-use crate::vectors::wide;
-use crate::vectors::{dot, mean};
-use num_complex::Complex;
-use std::f64::consts::TAU;
-use std::ops::Range;
-
 /// One closed cycle: M equidistant points of one period.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cycle {

@@ -1,15 +1,9 @@
 //! Result of the analysis of a record's loops.
 
-use super::HysteresisError;
-use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
-use super::dominant_frequency::dominant_frequency;
 use super::finding::LoopFinding;
-use super::impact::{Decay, DecayCycle, FIRST_CYCLES, decay};
-use super::loops::{OverCycles, swing};
-use super::record::{HysteresisRecord, Relative};
+use super::impact::DecayCycle;
+use super::loops::OverCycles;
 use super::shape::{Shape, ShapeEvidence};
-use super::static_arm::Correction;
-use super::steady::shaker;
 use num_complex::Complex;
 use serde::Serialize;
 

@@ -1,17 +1,9 @@
 //! Z^J of one separate line by one method, for lines near rank loss or with a refusal.
 
-use super::batched::{Job, LineResults};
-use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
-use super::decoupling::{interface, internal, internal_printed};
+use super::decoupling::{InverseBlock, PrimalBlock};
 use super::internal_dofs::Rearrangement;
-use super::measured_set::{MeasuredSet, Side};
-use super::method::Method;
-use super::pseudo_inverse::{condition, rank};
-use super::quality::Internals;
-use super::reduced::{MethodKind, Reduced, RefusedReason};
+use super::reduced::RefusedReason;
 use nalgebra::{Complex, DMatrix};
-
-type Line = DMatrix<Complex<f64>>;
 
 /// The operation that a method applies to a line.
 pub(super) enum Work<'a> {

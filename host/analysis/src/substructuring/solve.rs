@@ -1,7 +1,7 @@
 //! Z^J of every line by every requested method.
 
 use super::batched::{Job, LineResults};
-use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
+use super::decoupling::{DecouplingError, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
 use super::internal_dofs::Rearrangement;
 use super::measured_set::{MeasuredSet, Side};

@@ -4,12 +4,6 @@
 use crate::analyse::shaker_levels::Analysed;
 use crate::campaign::plan::level::{Level, Moment};
 use crate::hysteresis::OverCycles;
-use crate::identified::SCATTER_OF_LINES;
-use crate::results::MAIN_BAND;
-use crate::substructuring::cmif::Cmif;
-use crate::substructuring::explained::{BEYOND, Explained, USUAL};
-use crate::substructuring::identify::{Identification, Internals};
-use crate::substructuring::{BandStatistic, Dof, JointSpectrum, Method, Refused};
 
 /// Accepted relative change of a level's stiffness between before and after.
 const CHANGE: f64 = 0.03;

@@ -9,9 +9,6 @@
 //!
 //! Checks whether A and B are the same structures in all configurations.
 
-use super::shaker_levels::Analysed;
-use crate::campaign::plan::level::{Level, Moment};
-use crate::hysteresis::OverCycles;
 use crate::identified::SCATTER_OF_LINES;
 use crate::results::MAIN_BAND;
 use crate::substructuring::cmif::Cmif;

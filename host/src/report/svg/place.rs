@@ -1,9 +1,7 @@
 //! Maps a panel's values to positions on the drawing.
 
-use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::marks;
+use super::drawing::Area;
 
-use crate::report::figure::{Body, Marker, Scene};
 use crate::report::scale::Scale;
 
 /// A panel with its frame and axes in pixels.

@@ -3,7 +3,6 @@
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::marks;
 use crate::report::figure::{Body, Marker, Scene};
-use crate::report::scale::Scale;
 
 /// Initial viewing direction, rad: about the vertical, then down from the horizontal.
 const YAW: f64 = 0.7;

@@ -6,14 +6,11 @@
 
 use super::block::{Line, Ports};
 use super::chart;
-use super::chart::{At, Chart};
-use super::problem::Problem;
-use crate::substructuring::idm::IdmSet;
-use crate::substructuring::joint_over_bands::median;
+use super::chart::At;
 use crate::substructuring::lanes::{Matrix, Pool, Reliable, inverse, lines, minus, plus, product};
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
 use crate::vectors::wide;
-use nalgebra::{Complex, DVector};
+use nalgebra::Complex;
 use pulp::{Simd, WithSimd};
 
 type C = Complex<f64>;
@@ -219,4 +216,3 @@ fn held<'p, S: Simd>(pool: &Pool<S>, interface: &Matrix<'p, S>, lanes: usize) ->
     let regular = regular.collect();
     (h, regular)
 }
-

@@ -1,16 +1,13 @@
 //! Start values of the search.
 
-use super::block::{Line, Ports};
-use super::chart;
-use super::chart::{At, Chart};
+use super::block::Line;
+use super::chart::Chart;
 use super::model::Layout;
 use super::problem::Problem;
 use crate::substructuring::idm::IdmSet;
 use crate::substructuring::joint_over_bands::median;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
-use crate::vectors::wide;
 use nalgebra::{Complex, DVector};
-use pulp::{Simd, WithSimd};
 
 /// Range of κ: from a joint with hardly any stiffness to one with hardly any compliance.
 const ENDS: [f64; 2] = [1e-3, 0.999];
