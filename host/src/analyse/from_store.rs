@@ -368,7 +368,7 @@ impl CampaignFile {
 impl CampaignFile {
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
         if !row.gaps.is_empty() {
-            return Err("samples of it were lost on the way: measure it again".into());
+            return Err("some of its samples were lost during transmission: measure it again".into());
         }
         let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
         let samples = store.level_samples(row).map_err(|error| error.to_string())?;
@@ -716,7 +716,7 @@ pub enum AnalyseError {
     },
     /// One cell has records of two sampling rates.
     #[error(
-        "record {record} was sampled at {rate_hz} Hz, those before it at {others_hz} Hz: their spectra have other lines; refuse one or the other and measure again"
+        "record {record} was sampled at {rate_hz} Hz, earlier ones at {others_hz} Hz, so their spectra have different lines: refuse one or the other and measure again"
     )]
     Rate {
         /// The record.

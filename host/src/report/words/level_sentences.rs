@@ -50,7 +50,7 @@ pub fn none(why: &NoLevelStiffness) -> String {
             short(*deviations)
         ),
         NoLevelStiffness::Wide(half) => format!(
-            "the specimens' rotation makes so much of Δx here that k_T is known to ± {} % only",
+            "so much of Δx at this frequency comes from the specimens' rotation that k_T is known only to ± {} %",
             short(100.0 * half)
         ),
     };
