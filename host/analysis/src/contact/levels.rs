@@ -89,7 +89,9 @@ pub enum LevelError {
     #[error("its frequency is outside {low:.0}–{high:.0} Hz, the band in which k_T can be determined", low = BAND.low_hz, high = BAND.high_hz)]
     OutOfBand,
     /// No impact drives the contact.
-    #[error("there is no impact along z on the moving mass (grouping 3), which is needed to know where the shaker pushes")]
+    #[error(
+        "there is no impact along z on the moving mass (grouping 3), which is needed to know where the shaker pushes"
+    )]
     NoImpact,
     /// The hits have no lines around its frequency.
     #[error("the hits have no usable lines around its frequency")]

@@ -301,7 +301,7 @@ pub fn evaluate(blocks: &[Block], p: &[f64], before: Option<&Motion>) -> Result<
     let bins: Vec<Option<Bin>> =
         tasks.into_par_iter().map(|(b, lines)| bin(blocks, b, lines, p, before)).collect();
     bins.into_iter().collect::<Option<Vec<Bin>>>().ok_or_else(|| {
-        ContactError::NotIdentified("the motion of arm B and specimen A cannot be determined from the points".into())
+        ContactError::NotIdentified("the points do not determine the motion of arm B and specimen A".into())
     })
 }
 

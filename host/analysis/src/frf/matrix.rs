@@ -497,7 +497,8 @@ pub enum FrfError {
     },
     /// A coherence is not between 0 and 1.
     #[error(
-        "the coherence of the FRF from `{input}` to `{output}` is {coherence} at {frequency_hz} Hz: a coherence must lie between 0 and 1, or be NaN if it is not known; estimate it again or leave it out"
+        "the coherence of the FRF from `{input}` to `{output}` is {coherence} at {frequency_hz} Hz: a coherence must lie between 0 and 1, or be NaN \
+         if it is not known; estimate it again or leave it out"
     )]
     Coherence {
         /// The row's name.

@@ -216,7 +216,7 @@ pub fn pulses(results: &Results) -> Option<Figure> {
             "pulses",
             "",
             "The hammer over the campaign",
-            "Peak force of every hit, and the duration of the coil's pulse by which the runner held it. Overloads lie beyond the frame.",
+            "Peak force of every hit, and the duration of the coil's pulse, by which the force is controlled. Overloads lie beyond the frame.",
         )
         .with(peak)
         .with(coil),

@@ -174,7 +174,8 @@ impl Fitted {
         }
         if !self.converged {
             warnings.push(
-                "the search was stopped before it converged: the estimate still moved by more than half its standard deviation, or it moved only after the data were given less weight".into(),
+                "the search was stopped before it converged: the estimate still moved by more than half its standard deviation, or it moved only \
+                 after the data were given less weight".into(),
             );
         }
         if self.largest_error > 5.0 {
@@ -192,7 +193,7 @@ impl Fitted {
                 (false, true) => format!("below {high:.3e} {unit}"),
                 (false, false) => "no limit".into(),
             };
-            warnings.push(format!("k_{dof} is not identified: the data give {says}"));
+            warnings.push(format!("k_{dof} is not identified; 95 % limits: {says}"));
         }
         warnings
     }
