@@ -134,7 +134,7 @@ impl AnalysedLength {
         if self.measured {
             return (from_lead[1] > plan_s + LEAD_S).then(|| {
                 format!(
-                    "imported records last up to {:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
+                    "imported records last up to {:.3} s after the hit: they are cut to the plan's length_s of {plan_s} s, which the \
                      measured records have",
                     from_lead[1]
                 )
@@ -149,7 +149,7 @@ impl AnalysedLength {
         }
         self.whole_s().map(|whole_s| {
             format!(
-                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used whole, with a line every {:.3} Hz",
+                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used in full, with a line every {:.3} Hz",
                 1.0 / whole_s
             )
         })

@@ -80,7 +80,7 @@ fn said(cell: &CellRow) -> String {
     let refused =
         if refused.is_empty() { String::new() } else { format!("; refused: {}", refused.join(", ")) };
     format!(
-        "{}, hit at {}, seen at {}: {} of {} kept{refused}",
+        "{}, impact {}, response {}: {} of {} kept{refused}",
         cell.configuration, cell.impact, cell.response, cell.kept, cell.wanted
     )
 }

@@ -37,10 +37,10 @@ pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
 fn of_cause(cause: Cause) -> &'static str {
     match cause {
         Cause::Noise => "noise",
-        Cause::Spots => "where the spots beside the contact are",
-        Cause::SpecimenPoints => "where the points on the specimen are",
-        Cause::ArmPoints => "where the points on arm B are",
-        Cause::Aim => "how well each cell was aimed",
+        Cause::Spots => "the positions of the spots next to the contact",
+        Cause::SpecimenPoints => "the positions of the points on the specimen",
+        Cause::ArmPoints => "the positions of the points on arm B",
+        Cause::Aim => "the aim of the hits in each cell",
         Cause::HammerTilt => "the hammer's tilt",
         Cause::Gains => "gains",
         Cause::Skew => "delays between channels",
@@ -67,7 +67,7 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
             "the points on specimen A do not move as one rigid body (is one misplaced, or does the specimen bend?)"
         }
         Doubt::Spots => {
-            "the spots beside the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
+            "the spots next to the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
         }
         Doubt::Stated => {
             let farthest = diagnosis.farthest.as_ref();

@@ -190,7 +190,7 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
             let [loops, fbs] = both(sizes);
             let [series, low, high] = found.between_n_per_m().unwrap_or([f64::NAN; 3]);
             let meaning = format!(
-                "Between the laser spots it is {} times stiffer than between the arms, where FBS looks ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
+                "Between the laser spots it is {} times stiffer than between the arms, where FBS measures ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
                  the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself \
                  (95 % {}…{}).",
                 short(sizes.ratio()),
@@ -208,14 +208,14 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
         SeriesCompliance::Softer(sizes) => {
             let [loops, fbs] = both(sizes);
             with(sizes, check(format!(
-                "Between the laser spots it is softer than between the arms, where FBS looks ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
+                "Between the laser spots it is softer than between the arms, where FBS measures ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
                  and at the FBS methods' agreement first."
             )))
         }
         SeriesCompliance::SameSize(sizes) => {
             let [loops, fbs] = both(sizes);
             with(sizes, check(format!(
-                "Between the arms, where FBS looks, and between the laser spots the stiffness is about the same ({fbs} and {loops} N/µm): there is no \
+                "Between the arms, where FBS measures, and between the laser spots the stiffness is about the same ({fbs} and {loops} N/µm): there is no \
                  sign of anything much softer than the contact between them. Neither value is the contact's own."
             )))
         }
@@ -244,10 +244,10 @@ pub fn hammer_slip(found: &HammerSlip) -> Check {
             short(scaling.std)
         ),
         HammerSlip::CannotTell(Unclear::TooFewHits { differences, needed }) => format!(
-            "Whether the contact slips under the hammer cannot be told: {differences} hits can be compared with another hit of their cell, {needed} are needed."
+            "It cannot be determined whether the contact slips under the hammer: {differences} hits can be compared with another hit of their cell, {needed} are needed."
         ),
         HammerSlip::CannotTell(Unclear::TooAlike { force_scatter, .. }) => format!(
-            "Whether the contact slips under the hammer cannot be told: the hits of a cell differ by only {} % in force. Vary the coil's pulse by some per cent.",
+            "It cannot be determined whether the contact slips under the hammer: the hits of a cell differ by only {} % in force. Vary the coil's pulse by some per cent.",
             short(100.0 * force_scatter)
         ),
     };
@@ -268,9 +268,9 @@ fn hidden_resonance(found: &HiddenResonance) -> Check {
     let over = |peak: &ImaginaryPeak, check: Check| check.with("peak_over_level", peak.over_level);
     match found {
         HiddenResonance::NoSignals => check(
-            "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for it.".into(),
+            "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for a hidden resonance.".into(),
         ),
-        HiddenResonance::TooFewLines => check("Too few lines between 100 and 400 Hz to look for it.".into()),
+        HiddenResonance::TooFewLines => check("Too few lines between 100 and 400 Hz to look for a hidden resonance.".into()),
         HiddenResonance::Quiet(peak) => over(
             peak,
             check("Both specimens move in phase with the force between 100 and 400 Hz: there is no hidden resonance.".into()),

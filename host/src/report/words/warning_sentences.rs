@@ -143,7 +143,7 @@ pub fn loop_finding(found: &LoopFinding) -> String {
 
 /// The effect of a resonance of one specimen on a loop that still looks stuck.
 pub fn beside_resonance(frequency_hz: f64, resonance_hz: f64) -> String {
-    let (way, effect) = if frequency_hz < resonance_hz { ("adds to", "low") } else { ("takes from", "high") };
+    let (way, effect) = if frequency_hz < resonance_hz { ("adds to", "low") } else { ("reduces", "high") };
     format!(
         "a resonance of one specimen at {} Hz {way} Δx here: this slope reads {effect}, and the error grows towards the resonance",
         short(resonance_hz)

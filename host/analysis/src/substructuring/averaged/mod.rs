@@ -167,7 +167,7 @@ impl Averaged {
         let origin = if self.noise_known {
             ""
         } else {
-            " (the FRFs came without their variance, so the interval holds errors of position and angle only)"
+            " (the FRFs came without their variance, so the interval covers errors of position and angle only)"
         };
         Some(if z.identified {
             format!(
