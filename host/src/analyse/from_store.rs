@@ -133,7 +133,7 @@ impl AnalysedLength {
         if self.measured {
             return (from_lead[1] > plan_s + LEAD_S).then(|| {
                 format!(
-                    "imported records last up to {:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
+                    "imported records last up to {:.3} s after the hit: they are cut to the plan's length_s of {plan_s} s, which the \
                      measured records have",
                     from_lead[1]
                 )
@@ -148,7 +148,7 @@ impl AnalysedLength {
         }
         self.whole_s().map(|whole_s| {
             format!(
-                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used whole, with a line every {:.3} Hz",
+                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used in full, with a line every {:.3} Hz",
                 1.0 / whole_s
             )
         })
@@ -367,7 +367,7 @@ impl CampaignFile {
 impl CampaignFile {
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
         if !row.gaps.is_empty() {
-            return Err("samples of it were lost on the way: measure it again".into());
+            return Err("some of its samples were lost during transmission: measure it again".into());
         }
         let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
         let samples = store.level_samples(row).map_err(|error| error.to_string())?;
@@ -671,7 +671,7 @@ pub enum AnalyseError {
     },
     /// One cell has records of two sampling rates.
     #[error(
-        "record {record} was sampled at {rate_hz} Hz, those before it at {others_hz} Hz: their spectra have other lines; refuse one or the other and measure again"
+        "record {record} was sampled at {rate_hz} Hz, earlier ones at {others_hz} Hz, so their spectra have different lines: refuse one or the other and measure again"
     )]
     Rate {
         /// The record.

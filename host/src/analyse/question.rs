@@ -53,7 +53,7 @@ impl Default for Question {
 pub enum QuestionError {
     /// None of the default bands contains a line of the files.
     #[error(
-        "none of the default bands holds a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
+        "none of the default bands contains a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
     )]
     NoBand {
         /// First line, Hz.

@@ -133,7 +133,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
         .into_iter()
         .collect();
     let mut warnings = vec![
-        "slope over the first cycles of a decay: every mode that the hit excites is in it, so it is not the contact's stiffness alone".to_string(),
+        "slope over the first cycles of a decay: it contains every mode that the hit excites, so it is not the contact's stiffness alone".to_string(),
     ];
     let worst = used.iter().map(|c| c.r_squared).fold(1.0, f64::min);
     if worst < CLEAN_LINE {
@@ -144,7 +144,7 @@ fn impact(record: &HysteresisRecord, motion: &Relative) -> Result<LoopAnalysis, 
     }
     if let Some(peak) = hidden {
         warnings.push(format!(
-            "this slope is k_eq, not k_T: near {:.0} Hz Δx and T are out of phase, so that a resonance of one specimen is in it",
+            "this slope is k_eq, not k_T: near {:.0} Hz Δx and T are out of phase, so it contains a resonance of one specimen",
             peak.frequency_hz
         ));
     }

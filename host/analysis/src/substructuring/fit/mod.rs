@@ -140,7 +140,7 @@ pub enum FitError {
     },
     /// The covariance of the noise cannot be factorised.
     #[error(
-        "the residuals' covariance is singular: two channels or impacts say the same, or variances differ by more than rounding bears"
+        "the residuals' covariance is singular: two channels or impacts are the same, or the variances differ by too many orders of magnitude"
     )]
     NoiseSingular,
     /// The cost has no clear minimum.
