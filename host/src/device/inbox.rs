@@ -202,7 +202,7 @@ impl Inbox {
             .map_or(0, |before| edge.number.wrapping_sub(before).wrapping_sub(1));
         if lost > 0 {
             log::warn!(
-                "{lost} edges of the sync port were not told before {edge:?}: they came too fast, or the link lost them"
+                "{lost} edges of the sync port were not reported before {edge:?}: they came too fast, or the link lost them"
             );
         }
         if self.edges.len() < EDGES_KEPT {
