@@ -130,7 +130,7 @@ fn of_counters(counters: &Counters) -> Claim {
 }
 
 fn of_status(status: &Status) -> Claim {
-    scan("the next one stands", status.next_scan)?;
+    scan("the next one is", status.next_scan)?;
     scan("its ring begins", status.oldest_scan)?;
     of_counters(&status.counters)?;
     status.shot.as_ref().map_or(Ok(()), of_shot)

@@ -176,7 +176,7 @@ impl Inbox {
                     let lost = *first_scan..first_scan.saturating_add(u64::from(*scans));
                     if !stream.mark_lost(lost) {
                         self.nonsense = Some(
-                            "reports more losses than a stream has room for, all of them ahead of its scans"
+                            "reports more losses than a stream can store, all of them ahead of its scans"
                                 .into(),
                         );
                     }

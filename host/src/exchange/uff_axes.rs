@@ -46,7 +46,7 @@ impl UnitSystem {
             && !(same_factor(*length, *own_length) && same_factor(*force, *own_force))
         {
             return Err(format!(
-                "data set 164 contradicts itself: its code {code} stands for {names}, and its factors are {length} for length and {force} for force"
+                "data set 164 contradicts itself: its code {code} means {names}, but its factors are {length} for length and {force} for force"
             ));
         }
         let description = units.description.trim().to_owned();

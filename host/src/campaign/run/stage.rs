@@ -216,7 +216,7 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
             Ok(line) => match understood(&line) {
                 Understood::Key(key) => return Ok(key),
                 Understood::Quit => return Err(StageError::Stopped),
-                Understood::Nothing => tell(&format!("`{}` is none of these\n{QUESTION}", line.trim())),
+                Understood::Nothing => tell(&format!("`{}` is not one of these\n{QUESTION}", line.trim())),
             },
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LISTEN),
@@ -265,7 +265,7 @@ fn prompt(
             Understood::Key(key) => return Ok(key),
             Understood::Quit => return Err(StageError::Stopped),
             Understood::Nothing => {
-                let _ = writeln!(screen, "`{}` is none of these", line.trim().to_ascii_lowercase());
+                let _ = writeln!(screen, "`{}` is not one of these", line.trim().to_ascii_lowercase());
             }
         }
     }
@@ -369,7 +369,7 @@ mod tests {
             let (key, screen) = answered(keys);
             assert_eq!(key.expect(keys), wanted);
             assert!(screen.contains("hammer to AZ1") && screen.contains("q quit"), "{screen}");
-            assert_eq!(screen.contains("`x` is none of these"), keys.starts_with('x'));
+            assert_eq!(screen.contains("`x` is not one of these"), keys.starts_with('x'));
         }
         assert!(matches!(answered("q\n").0, Err(StageError::Stopped)));
         assert!(matches!(answered("").0, Err(StageError::NobodyThere)));

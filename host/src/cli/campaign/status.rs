@@ -62,7 +62,7 @@ impl Status {
             ),
             match (tally.complete(), tally.given_up()) {
                 (true, _) => "complete".into(),
-                (false, 0) => "not complete: `jointrig campaign run` goes on".into(),
+                (false, 0) => "not complete: continue with `jointrig campaign run`".into(),
                 (false, n) => format!("not complete; {n} cells were given up"),
             },
         ])
