@@ -134,7 +134,7 @@ impl Plant {
         let slipping = Slipping::new(sliders, joint, &stepper).ok_or_else(|| RigError::Field {
             field: "contact.slip_step_s".to_owned(),
             reason: format!(
-                "is too long for so stiff a contact on so light bodies: try {:.0e}",
+                "is too long for this contact stiffness and these masses: try {:.0e}",
                 joint.step_s / 4.0
             ),
             line: None,

@@ -39,13 +39,13 @@ pub fn serve(listener: TcpListener, shared: Shared, stop: &AtomicBool) -> io::Re
                 Ok(accepted) => accepted,
                 Err(error) => {
                     // out of file descriptors, or the client has disconnected: the server continues
-                    log::debug!("a client could not be taken: {error}");
+                    log::debug!("a client could not be accepted: {error}");
                     tokio::time::sleep(LOOK).await;
                     continue;
                 }
             };
             let Ok(place) = clients.clone().try_acquire_owned() else {
-                log::debug!("more than {CLIENTS} clients: one is turned away");
+                log::debug!("more than {CLIENTS} clients: one is rejected");
                 continue;
             };
             let service = TowerToHyperService::new(router.clone());

@@ -43,7 +43,7 @@ impl Serial {
         })?;
         // A pseudo-terminal has no modem lines; a USB port only sends once DTR is set.
         if let Err(error) = port.write_data_terminal_ready(true) {
-            log::debug!("serial:{name}: DTR cannot be set ({error}); taken for a pseudo-terminal");
+            log::debug!("serial:{name}: DTR cannot be set ({error}); treated as a pseudo-terminal");
         }
         Ok(Self { port, timeout })
     }

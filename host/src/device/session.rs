@@ -384,7 +384,7 @@ impl Session {
         self.resend_tries.0 = range.start;
         let Some(stream) = &mut self.inbox.stream else { return Ok(()) };
         if self.resend_tries.1 > RESEND_TRIES {
-            log::error!("scans {range:?} were asked for {RESEND_TRIES} times and never came");
+            log::error!("scans {range:?} were requested {RESEND_TRIES} times and never arrived");
             stream.mark_lost(range);
             return Ok(());
         }

@@ -158,7 +158,7 @@ fn look(
         Beside::Untold | Beside::Other if is_named => Ok(false),
         Beside::Untold => {
             told.push(format!(
-                "{}: labelled {axis}, and no label can name its direction {}, which counts",
+                "{}: labelled {axis}, but no label can name its direction {}, which is used",
                 point.description,
                 vector_name(point.direction)
             ));

@@ -183,7 +183,7 @@ fn hits(contents: &Contents) -> Result<(Vec<HitFunctions<'_>>, Vec<String>), Str
     match (hits.is_empty(), before) {
         (false, 0) => Ok((hits, notes)),
         (false, _) => {
-            Err("a time response stands before the first force: every hit begins with its force".into())
+            Err("a time response comes before the first force: every hit begins with its force".into())
         }
         (true, 0) => {
             let why = notes.first().map_or_else(String::new, |w| format!(" ({w})"));
@@ -192,7 +192,8 @@ fn hits(contents: &Contents) -> Result<(Vec<HitFunctions<'_>>, Vec<String>), Str
             ))
         }
         (true, signals) => Err(format!(
-            "there is no force among its {signals} time responses (an ordinate of type 13): an FRF needs the hammer's force, each hit's first"
+            "there is no force among its {signals} time responses (an ordinate of type 13): an FRF needs the hammer's force, \
+             before the responses of each hit"
         )),
     }
 }
@@ -394,7 +395,7 @@ impl Timing {
         let most = whole.iter().copied().map(cut).fold(cut(0.0), f64::max);
         if most >= samples as f64 {
             return Err(format!(
-                "a response starts {:e} s from its force, which is longer than the record: they are not of one hit",
+                "a response starts {:e} s from its force, which is longer than the record: they do not belong to one hit",
                 most * step_s
             ));
         }

@@ -21,8 +21,7 @@ pub fn read(text: &str) -> Result<RigConfig, RigError> {
         && let Some(field) = PAPERS_OWN.into_iter().find(|field| user.get_ref().contains_key(*field))
     {
         let line = locate(user.get_ref(), field).map(|offset| line_of(text, offset));
-        let reason =
-            "describes the paper's rig, and [structure] another one: take one of them out".to_owned();
+        let reason = "describes the paper's rig, and [structure] another one: remove one of them".to_owned();
         return Err(RigError::Field { field: field.to_owned(), reason, line });
     }
     // Only the user's text can be wrong here, so every span refers to it.

@@ -31,9 +31,7 @@ pub enum RunError {
     #[error("records can no longer be stored; run the same command again")]
     KeeperGone,
     /// The hammer is swung by a person, and nobody struck.
-    #[error(
-        "{cell}: nobody struck within {seconds} s (hammer.patience_s); run the same command again to go on"
-    )]
+    #[error("{cell}: no hit within {seconds} s (hammer.patience_s); run the same command again to continue")]
     NobodyStruck {
         /// The cell.
         cell: String,

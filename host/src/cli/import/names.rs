@@ -76,7 +76,7 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<NamedFile>, 
             (true, true) => with_labels_or_frfs(&path, configuration)?,
             _ => {
                 return Err(bad(format!(
-                    "{}: {file} has one of impact and response: give both or none",
+                    "{}: {file} has only one of impact and response: give both or none",
                     table.display()
                 )));
             }
