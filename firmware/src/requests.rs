@@ -8,8 +8,8 @@ use nalgebra::Matrix3;
 
 use crate::Core;
 use crate::board::Stage;
-use crate::refusal::out_of_bounds;
 use crate::ring::{CHANNEL_MAP, Range};
+use crate::sentence::out_of_bounds;
 
 impl<M: RawMutex> Core<'_, M> {
     /// Carries out a request that has not been carried out before.

@@ -24,6 +24,7 @@ use crate::in_step::InStep;
 use crate::logs::Tap;
 use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
+use crate::sentence::{Sentence, Tell};
 use crate::shaker::Shaker;
 
 /// Capacity for replies waiting for the link.
@@ -224,6 +225,25 @@ impl<'a, M: RawMutex> Core<'a, M> {
             drive_v: self.facts.drive_v,
             reset: self.facts.reset,
         }
+    }
+}
+
+/// Reports of a board: faults of its parts, and how its last run ended.
+impl<M: RawMutex> Core<'_, M> {
+    /// Reports a fault of a part of the board. Without a host, the event waits for one.
+    pub fn report_fault(&self, what: &(impl Tell + ?Sized)) {
+        let text = Sentence::of(what);
+        warning!("fault: {}", text.as_str());
+        self.with(|state| state.say(Event::Fault(text.into_string())));
+        self.to_send.signal(());
+    }
+
+    /// Reports that the previous run ended in a panic with this message.
+    pub fn report_panic(&self, what: &(impl Tell + ?Sized)) {
+        let text = Sentence::of(what);
+        warning!("the last run ended in a panic: {}", text.as_str());
+        self.with(|state| state.say(Event::Panic(text.into_string())));
+        self.to_send.signal(());
     }
 }
 

@@ -12,8 +12,8 @@ use jointrig_protocol::sync::{Clock, ClockFault, Edge, Line, Moment, Sync};
 
 use crate::Core;
 use crate::board::{Scans, Seen};
-use crate::refusal::out_of_bounds;
 use crate::ruler::Ago;
+use crate::sentence::out_of_bounds;
 use crate::state::State;
 
 impl State<'_> {
