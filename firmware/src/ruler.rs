@@ -1,4 +1,5 @@
-//! Converts timer counts of a board to instants in scans, and checks an external clock.
+//! Converts timer counts of a board to instants in scans, checks an external clock,
+//! and holds the state of scan clock, sync input and sync output.
 //!
 //! A board has a timer whose period is a scan, a counter of those periods, and a third,
 //! free-running timer whose inputs capture its count at an edge. An edge is thus known in counts of
@@ -6,7 +7,7 @@
 //! With an external clock, a period deviates from its nominal count; over a block of scans this is
 //! an error of less than 0.003 of a scan.
 
-use jointrig_protocol::sync::CLOCK_TOLERANCE_PPM;
+use jointrig_protocol::sync::{CLOCK_TOLERANCE_PPM, Clock, ClockFault, Line, Sync};
 
 /// An instant, relative to the next scan that will be delivered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -102,6 +103,34 @@ impl ClockWatch {
 }
 
 const _: () = assert!(1_000_000 % CLOCK_TOLERANCE_PPM == 0);
+
+/// State of clock and edges, and pending actions.
+#[derive(Default)]
+pub(crate) struct InStep {
+    /// Clock and counters, as reported to the host.
+    pub now: Sync,
+    /// Quality of the external clock so far.
+    pub watch: ClockWatch,
+    /// The board must select this clock.
+    pub order: Option<Clock>,
+    /// The sync output must pulse for this.
+    pub due: Option<Line>,
+}
+
+impl InStep {
+    /// Whether the board has a pending action.
+    #[inline]
+    pub fn is_due(&self) -> bool {
+        self.order.is_some() | self.due.is_some()
+    }
+
+    /// Selects a clock; an external one is unproven at first.
+    pub fn take(&mut self, clock: Clock) {
+        let fault = (clock != Clock::Internal).then_some(ClockFault::Unproven);
+        self.now = Sync { clock, fault, ppm: 0.0, ..self.now };
+        (self.watch, self.order) = (ClockWatch::default(), Some(clock));
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -20,10 +20,10 @@ use crate::events::Events;
 use crate::fmt::{info, warning};
 use crate::friction::Friction;
 use crate::hammer::{CoilOrder, Hammer, Outcome};
-use crate::in_step::InStep;
 use crate::logs::Tap;
 use crate::memory::Memory;
 use crate::ring::{Range, Ring, Slot};
+use crate::ruler::InStep;
 use crate::sentence::{Sentence, Tell};
 use crate::shaker::Shaker;
 

@@ -9,9 +9,9 @@
 /// diode across its coil, and the same again for bouncing contacts.
 pub const WITHIN_US: u64 = 50_000;
 
-/// Fault of the relay.
+/// RelayFault of the relay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum RelayFault {
     /// It has not been seen to drop since the start, or since a brief opening of the chain.
     Unproven,
     /// The chain opened and the relay did not drop: a contact is welded, or the wire of its return
@@ -21,18 +21,18 @@ pub enum Fault {
     Rests,
 }
 
-impl Fault {
+impl RelayFault {
     /// The fault, and what the operator must do.
     #[must_use]
     pub fn sentence(self) -> &'static str {
         match self {
-            Fault::Unproven => {
+            RelayFault::Unproven => {
                 "open the guard once: K1 was not seen to drop since the start or the last opening"
             }
-            Fault::Stays => {
+            RelayFault::Stays => {
                 "K1 does not drop: welded, or its return contact is off. Replace it, start the board again"
             }
-            Fault::Rests => {
+            RelayFault::Rests => {
                 "K1 does not pull though guard and stop are closed: its coil or the chain. Start the board again"
             }
         }
@@ -47,7 +47,7 @@ pub struct Relay {
     since_us: u64,
     /// Seen to drop since the chain last opened.
     proven: bool,
-    failed: Option<Fault>,
+    failed: Option<RelayFault>,
 }
 
 impl Default for Relay {
@@ -68,7 +68,7 @@ impl Relay {
     ///
     /// # Errors
     /// The fault of the relay. A failure stays until the next start.
-    pub fn see(&mut self, chain_closed: bool, dropped: bool, now_us: u64) -> Result<bool, Fault> {
+    pub fn see(&mut self, chain_closed: bool, dropped: bool, now_us: u64) -> Result<bool, RelayFault> {
         if chain_closed != self.chain_closed {
             (self.chain_closed, self.since_us) = (chain_closed, now_us);
             if !chain_closed {
@@ -78,11 +78,11 @@ impl Relay {
         let late = now_us.saturating_sub(self.since_us) > WITHIN_US;
         self.proven |= !chain_closed && dropped;
         if self.failed.is_none() && late && chain_closed == dropped {
-            self.failed = Some(if chain_closed { Fault::Rests } else { Fault::Stays });
+            self.failed = Some(if chain_closed { RelayFault::Rests } else { RelayFault::Stays });
         }
         match self.failed {
             Some(fault) => Err(fault),
-            None if chain_closed && !self.proven => Err(Fault::Unproven),
+            None if chain_closed && !self.proven => Err(RelayFault::Unproven),
             None => Ok(chain_closed),
         }
     }
@@ -94,7 +94,7 @@ mod tests {
 
     /// Evaluates every ms of these intervals: (until ms, chain closed, dropped); returns the last
     /// verdict.
-    fn after(stretches: &[(u64, bool, bool)]) -> Result<bool, Fault> {
+    fn after(stretches: &[(u64, bool, bool)]) -> Result<bool, RelayFault> {
         let mut relay = Relay::new();
         let (mut at, mut last) = (0, Ok(false));
         for (until, chain_closed, dropped) in stretches {
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn after_a_start_the_guard_must_be_opened_once() {
-        assert_eq!(after(&[(10_000, true, false)]), Err(Fault::Unproven));
+        assert_eq!(after(&[(10_000, true, false)]), Err(RelayFault::Unproven));
         assert_eq!(after(&[(100, false, true)]), Ok(false));
         assert_eq!(
             after(&[(100, true, false), (120, false, false), (200, false, true), (300, true, false)]),
@@ -123,29 +123,29 @@ mod tests {
         let welded = [&works[..], &[(1_040, false, false)]].concat();
         assert_eq!(after(&welded), Ok(false), "it may take its time");
         let welded = [&works[..], &[(1_060, false, false)]].concat();
-        assert_eq!(after(&welded), Err(Fault::Stays));
+        assert_eq!(after(&welded), Err(RelayFault::Stays));
         let closed_again = [&welded[..], &[(2_000, true, false)]].concat();
-        assert_eq!(after(&closed_again), Err(Fault::Stays));
+        assert_eq!(after(&closed_again), Err(RelayFault::Stays));
         // the guard opens and closes before the relay could have dropped: its state is unknown, and
         // motion is not allowed
         let shortly = [&works[..], &[(1_010, false, false), (1_500, true, false)]].concat();
-        assert_eq!(after(&shortly), Err(Fault::Unproven));
+        assert_eq!(after(&shortly), Err(RelayFault::Unproven));
     }
 
     #[test]
     fn a_relay_that_does_not_pull_is_found() {
         assert_eq!(after(&[(100, false, true), (150, true, true)]), Ok(true));
-        assert_eq!(after(&[(100, false, true), (160, true, true)]), Err(Fault::Rests));
+        assert_eq!(after(&[(100, false, true), (160, true, true)]), Err(RelayFault::Rests));
     }
 
     #[test]
     fn a_return_contact_that_is_off_is_taken_for_a_weld() {
-        assert_eq!(after(&[(60, false, false)]), Err(Fault::Stays));
+        assert_eq!(after(&[(60, false, false)]), Err(RelayFault::Stays));
     }
 
     #[test]
     fn sentences_fit_an_event() {
-        for fault in [Fault::Unproven, Fault::Stays, Fault::Rests] {
+        for fault in [RelayFault::Unproven, RelayFault::Stays, RelayFault::Rests] {
             assert!(fault.sentence().len() <= jointrig_protocol::limits::SENTENCE_BYTES);
         }
     }
