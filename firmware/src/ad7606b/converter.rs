@@ -327,7 +327,8 @@ impl<S: SpiDevice, R: OutputPin> Converter<S, R> {
 }
 
 pub mod registers {
-    //! Addresses, bits and command frames: AD7606B Rev. 0, "Register Summary" and "Register Details".
+    //! Addresses, bits and command frames: AD7606B Rev. 0, "Register Summary" and "Register
+    //! Details".
 
     use crc::{Algorithm, Crc, Table};
 
@@ -345,8 +346,8 @@ pub mod registers {
     /// Position of the number of lines in CONFIG.
     pub const LINES_SHIFT: u8 = 3;
 
-    /// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is in
-    /// the lower half.
+    /// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is
+    /// in the lower half.
     pub const RANGE_CH1_CH2: u8 = 0x03;
     /// One bit per channel: 1 selects 220 kHz (AD7606C only).
     pub const BANDWIDTH: u8 = 0x07;
@@ -369,7 +370,8 @@ pub mod registers {
     pub const SPI_READ: u8 = 1 << 4;
     /// BUSY was high for more than 4 µs after a conversion should have ended.
     pub const BUSY_STUCK_HIGH: u8 = 1 << 5;
-    /// Conversions are replaced by [`super::super::frames::INTERFACE_PATTERN`] (in the enable register only).
+    /// Conversions are replaced by [`super::super::frames::INTERFACE_PATTERN`] (in the enable
+    /// register only).
     pub const INTERFACE_CHECK: u8 = 1 << 7;
 
     /// One bit per channel: enables open-circuit detection.
@@ -396,8 +398,8 @@ pub mod registers {
     /// The command that returns to ADC mode.
     pub const LEAVE: [u8; 2] = [0, 0];
 
-    /// x⁸ + x² + x + 1, initial value zero: the third byte of a register frame while [`INTERFACE_CRC`]
-    /// is set.
+    /// x⁸ + x² + x + 1, initial value zero: the third byte of a register frame while
+    /// [`INTERFACE_CRC`] is set.
     const FRAME_CRC: Algorithm<u8> = Algorithm {
         width: 8,
         poly: 0x07,

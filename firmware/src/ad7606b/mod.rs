@@ -16,8 +16,8 @@
 //! |---|---|
 //! | [`part`] | differences between the parts; input ranges, conversion between codes and volts |
 //! | [`frames`] | data on the DOUT lines, and its CRC |
-//! | [`converter`] | one chip: registers, reset, identity, settings, diagnostics, single conversions |
-//! | [`reader`] | two chips: whether they are aligned with their clock; sixteen channels per scan, accounting of missing scans, faults |
+//! | [`converter`] | one chip: registers, reset, settings, diagnostics, single conversions |
+//! | [`reader`] | two chips: alignment with their clock, sixteen channels per scan, faults |
 
 pub mod converter;
 pub mod error;

@@ -1,5 +1,5 @@
-//! Differences between the parts that fit the same footprint; input ranges, and the conversion between
-//! codes and volts.
+//! Differences between the parts that fit the same footprint; input ranges, and the conversion
+//! between codes and volts.
 //!
 //! A code is two's complement, and code 0 is 0 V: one step is `2 × full scale / 2^bits` (AD7606B
 //! Rev. 0, "ADC Transfer Function").
