@@ -16,6 +16,9 @@
 //! - [`watch::watch`] disarms the hammer and stops the shaker when the host falls silent, and
 //!   reports counters.
 //!
+//! What moves belongs to [`safety`]: one file states what forbids motion, who sets and who clears
+//! it, and in which order.
+//!
 //! The scan index is the only time base for results; `embassy-time` is used for timeouts. Results
 //! never depend on the order in which an executor polls the four tasks.
 #![no_std]
@@ -29,7 +32,6 @@ pub mod feed;
 mod fmt;
 pub mod friction;
 pub mod hammer;
-mod judging;
 pub mod lockstep;
 pub mod logs;
 pub mod memory;

@@ -1,16 +1,13 @@
-//! Values measured a few times a second: the specimen's temperature, and whether the sensors fed with
-//! a constant current are connected.
+//! Values measured a few times a second: the specimen's temperature, and the supplies of sensors
+//! fed with a constant current.
 //!
 //! An actuator that needs such a sensor does not move while its cable is open or shorted. The
 //! circuits are in docs/WIRING.md.
 
 use jointrig_protocol::answer::Refusal;
-use jointrig_protocol::event::Reason;
 use jointrig_protocol::slow::{Slow, Supply};
 #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
 use micromath::F32Ext;
-
-use crate::state::State;
 
 /// The resistor from the reference to the Pt1000, Ω.
 const SERIES_OHM: f32 = 2_200.0;
@@ -25,27 +22,29 @@ const B: f32 = -5.775e-7;
 /// shorted.
 const BELIEVED_C: core::ops::Range<f32> = -50.0..150.0;
 
-impl State<'_> {
+/// The last measured values.
+#[derive(Default)]
+pub(crate) struct Supplies {
+    slow: Slow,
+}
+
+impl Supplies {
+    /// Stores the measured values.
+    pub fn take(&mut self, slow: Slow) {
+        self.slow = slow;
+    }
+
+    /// The last measured values.
+    pub fn latest(&self) -> &Slow {
+        &self.slow
+    }
+
     /// Whether the sensor of a channel is present, as far as its supply can detect; channels
     /// without a supply are not checked.
     pub fn is_fed(&self, channel: Option<usize>) -> Result<(), Refusal> {
         let own = |supply: &&Supply| Some(usize::from(supply.channel)) == channel;
         let Some(supply) = self.slow.supplies.iter().find(own) else { return Ok(()) };
         supply.fault().map_or(Ok(()), |fault| Err(Refusal::Supply { channel: supply.channel, fault }))
-    }
-
-    /// Stores the measured values. If the force sensor of the hammer is missing, the hammer is
-    /// disarmed; if that of the shaker is missing, the shaker comes to rest.
-    #[inline(never)]
-    pub fn take_slow(&mut self, slow: Slow) {
-        self.slow = slow;
-        if let Err(Refusal::Supply { channel, .. }) = self.is_fed(self.hammer.force_channel()) {
-            self.disarm(Reason::Supply { channel });
-        }
-        if let Err(Refusal::Supply { channel, .. }) = self.is_fed(self.excitation) {
-            let stops = self.shaker.stop(Reason::Supply { channel });
-            self.tell_of_shaker(stops);
-        }
     }
 }
 
