@@ -1,6 +1,6 @@
 //! Safety: what moves, what stops it, and what may start it again, in one file.
 //!
-//! [`Safety`] owns hammer and shaker and the orders for coil and drive. Its fields are private: the
+//! `Safety` owns hammer and shaker and the orders for coil and drive. Its fields are private: the
 //! rest of the firmware can arm, fire or shake only through the methods here, each of which asks
 //! first whether motion is allowed. The state machines themselves ([`crate::hammer`],
 //! [`crate::shaker`]) hold the bounds of one motion: validity, caps, limits, ramps.
@@ -627,6 +627,60 @@ impl Relay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use jointrig_protocol::channel::{Name, Quantity};
+
+    /// A hammer with its force cell, and a shaker.
+    fn channels() -> [Channel; 2] {
+        [Role::HammerForce, Role::Excitation].map(|role| Channel {
+            name: Name::new(),
+            role,
+            quantity: Quantity::Force,
+            units_per_volt: 1.0,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        })
+    }
+
+    #[test]
+    fn a_stop_is_reset_only_with_its_button_released_and_its_key_turned() {
+        let channels = channels();
+        let mut safety = Safety::new(&channels, 51_200, 8_000, 10.0);
+        safety.begin_stream();
+        // requested by the host, with the button never pressed
+        safety.stop_everything();
+        assert_eq!(safety.take_orders(), Orders { coil: Some(CoilOrder::Off), drive_off: true });
+        for (pressed, reset) in [(false, false), (true, false), (true, true), (false, false)] {
+            safety.poll_inputs(true, pressed, reset);
+            safety.begin_stream();
+            assert_eq!(safety.may_move(), Err(Refusal::EmergencyStop), "{pressed}, {reset}");
+        }
+        safety.poll_inputs(true, false, true);
+        assert_eq!(safety.may_move(), Ok(()));
+        assert_eq!(safety.hammer.state(), answer::Hammer::Disarmed);
+    }
+
+    #[test]
+    fn what_ends_a_stream_disarms_and_forbids_the_next_arming() {
+        let channels = channels();
+        let mut safety = Safety::new(&channels, 51_200, 8_000, 10.0);
+        assert_eq!(safety.arm(1_000), Err(Refusal::NotStreaming));
+        let ends: [fn(&mut Safety<'_>); 2] =
+            [|safety| safety.end_stream(Reason::StreamEnded), |safety| safety.clock_fails(ClockFault::Lost)];
+        for end in ends {
+            safety.begin_stream();
+            assert_eq!(safety.arm(1_000), Ok(()));
+            end(&mut safety);
+            assert_eq!(safety.hammer.state(), answer::Hammer::Disarmed);
+            assert_eq!(safety.arm(1_000), Err(Refusal::NotStreaming));
+        }
+        // lost scans disarm, and forbid nothing
+        safety.begin_stream();
+        assert_eq!(safety.arm(1_000), Ok(()));
+        safety.scans_are_lost();
+        assert_eq!(safety.hammer.state(), answer::Hammer::Disarmed);
+        assert_eq!(safety.arm(1_000), Ok(()));
+    }
 
     /// Evaluates every ms of these intervals: (until ms, chain closed, dropped); returns the last
     /// verdict.
