@@ -1,6 +1,6 @@
 //! Information in a campaign file about itself: provenance, and how much of the plan was measured.
 
-use super::from_store::AnalyseError;
+use super::analyse_error::AnalyseError;
 use crate::campaign::store::Store;
 use crate::results::{Calibrated, rounded};
 

@@ -10,6 +10,7 @@
 //! [`Findings::missing`], and the analysis continues without them: hysteresis needs only the
 //! assembly, substructuring needs all three configurations.
 
+mod analyse_error;
 mod arm_from_hits;
 mod assemble;
 mod averages;
@@ -31,6 +32,7 @@ mod hammer_slip;
 mod impact_loops;
 mod imported;
 mod level_stiffness;
+mod measured_frfs;
 mod missing;
 mod plan_geometry;
 mod question;
@@ -43,6 +45,7 @@ mod shaker_levels_tests;
 mod specimen_curves;
 mod wanted;
 
+pub use analyse_error::AnalyseError;
 pub use averages::LINES_HZ;
 pub use campaign::analyse_measurements;
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
@@ -50,7 +53,6 @@ pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use fits::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
-pub use from_store::AnalyseError;
 pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use level_stiffness::NoLevelStiffness;

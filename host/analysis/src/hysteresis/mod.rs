@@ -21,6 +21,7 @@ pub mod cycle;
 pub mod cycles;
 mod dominant_frequency;
 pub mod finding;
+pub mod first_cycle;
 pub mod hammer_slip;
 mod hum;
 pub mod impact;

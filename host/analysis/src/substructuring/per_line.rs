@@ -3,7 +3,6 @@
 use super::decoupling::{InverseBlock, PrimalBlock};
 use super::internal_dofs::Rearrangement;
 use super::reduced::RefusedReason;
-use nalgebra::{Complex, DMatrix};
 
 /// The operation that a method applies to a line.
 pub(super) enum Work<'a> {
