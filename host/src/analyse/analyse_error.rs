@@ -1,36 +1,6 @@
 //! Errors of the analysis of a campaign file.
 
-use super::campaign::analyse_measurements;
-use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, ShakerLevel};
-use super::data_quality::DataQuality;
-use super::file_source::{calibrated, temperature_c};
-use super::findings::Findings;
-use super::plan_geometry::{geometry, places};
-use super::wanted::{Progress, Wanted};
-use crate::campaign::plan::{Plan, structure};
-use crate::campaign::run::shaking;
-use crate::campaign::run::tally::Tally;
-use crate::campaign::store::Store;
-use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
-use crate::campaign::store::frf_table::ImportedFrf;
-use crate::campaign::store::level_table::LevelRow;
-use crate::campaign::store::record_table::{Damaged, RecordRow};
-use crate::campaign::store::rows::{Rows, places as response_places};
-use crate::campaign::store::session_table::SessionInfo;
-use crate::contact::ContactPriors;
-use crate::device::channels::ChannelMap;
-use crate::hysteresis::HysteresisRecord;
-use crate::results;
-use crate::results::{Cells, Completeness, HitRow, Source, rounded};
-use crate::spectra::MotionQuantity;
-use crate::structure::Structure;
-use crate::substructuring::geometry::Geometry;
-use jointrig_protocol::channel::{Quantity, Role};
-use std::collections::{HashMap, HashSet};
-use std::ops::Range;
-use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
 
 /// Why a campaign file cannot be analysed, or one of its cells cannot be read.
 #[derive(Debug, thiserror::Error)]

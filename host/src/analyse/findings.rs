@@ -3,9 +3,6 @@
 //! [`crate::report::document()`] converts them to `results.json`. The stages pass data to later
 //! stages as arguments; none reads what another stored here.
 
-use super::assemble::{everything, hits};
-use super::averages::{Asked, CellAverage, CellSums};
-use super::cell::{CellName, Measurements};
 use super::contact_stage::Contact;
 use super::data_quality::DataQuality;
 use super::fits::Fit;
@@ -21,8 +18,6 @@ use crate::structure::Structure;
 use crate::substructuring::Frf;
 use crate::substructuring::averaged::{Averaged, Priors};
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
-use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 /// All findings of the stages that were run.
 #[derive(Debug, Clone, PartialEq, Default)]

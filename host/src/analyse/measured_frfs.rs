@@ -3,22 +3,9 @@
 use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::cell::{CellName, Measurements};
-use super::contact_stage::Contact;
-use super::data_quality::DataQuality;
-use super::fits::Fit;
-use super::from_frfs::Substructured;
 use super::from_store::CampaignFile;
-use super::missing::Missing;
-use super::shaker_levels::RecordLoops;
-use crate::contact::{ContactError, Stiffness};
-use crate::results::{
-    Bootstrap, Cells, Completeness, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
-};
-use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::Frf;
-use crate::substructuring::averaged::{Averaged, Priors};
-use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

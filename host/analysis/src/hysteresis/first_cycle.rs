@@ -1,18 +1,11 @@
 //! The first cycle of a hit's decay: its slope, and the correction that an arm's inertia would add.
 
 use super::analyse::decay_of;
-use super::cycles::open_record;
-use super::dominant_frequency::{dominant_frequency, turns};
-use super::impact::{DecayCycle, decay};
-use super::loops::{slope, swing};
-use super::record::{HysteresisRecord, Relative, RelativeMotion};
+use super::impact::DecayCycle;
+use super::loops::slope;
+use super::record::{HysteresisRecord, RelativeMotion};
 use super::static_arm::{Correction, rate};
 use super::{HysteresisError, Shape};
-use crate::median::middle;
-use crate::vectors::wide;
-use num_complex::Complex;
-use serde::Serialize;
-use std::f64::consts::TAU;
 
 /// Number of cycles of a decay that are reported: later ones are buried in noise, or contain only
 /// the lowest modes.
