@@ -5,11 +5,11 @@
 //! modes simultaneously: their slope is that of a first-cycle loop, not the contact's stiffness,
 //! and is reported as such.
 
+use super::HysteresisError;
 use super::cycles::open_record;
 use super::dominant_frequency::{dominant_frequency, turns};
 use super::loops::{slope, swing};
 use super::record::Relative;
-use super::HysteresisError;
 use crate::median::middle;
 use crate::vectors::wide;
 use num_complex::Complex;
