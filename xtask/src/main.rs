@@ -16,8 +16,8 @@ mod environment;
 mod firmware;
 mod flash;
 mod flat;
-mod house;
 mod jobs;
+mod layout;
 mod lint;
 mod locks;
 mod packages;
@@ -67,8 +67,10 @@ enum Task {
     FmtCheck,
     /// Run clippy on both workspaces with warnings as errors, and compare their locks.
     Lint,
-    /// Check the structural rules: crate graph, circular imports of files, equations, licences.
-    House,
+    /// Check the structural rules: crate graph, circular imports of files, equations, licences,
+    /// links.
+    #[command(alias = "house")]
+    Layout,
     /// Run all checks that must pass before a change is merged.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Test(suite::Options),
@@ -134,7 +136,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Firmware { board } => firmware::command(&project, board.as_deref()),
         Task::FmtCheck => lint::formatting(&project),
         Task::Lint => lint::all(&project),
-        Task::House => house::check(&project),
+        Task::Layout => layout::check(&project),
         Task::Test(options) => suite::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
