@@ -204,8 +204,21 @@ mod tests {
         let oldest =
             manifest["workspace"]["package"]["rust-version"].as_str().expect("it is stated").to_owned();
         let workflow = read(".github/workflows/ci.yml");
-        assert!(workflow.contains(&format!("toolchain: [stable, \"{oldest}\"]")), "{oldest}");
+        assert!(workflow.contains(&format!("RUSTUP_TOOLCHAIN: \"{oldest}\"")), "{oldest}");
         assert!(workflow.contains("\n      - run: cargo xtask test\n"));
+    }
+
+    #[test]
+    fn the_public_ci_runs_every_fuzz_target() {
+        let root = Project::locate().expect("the tests run inside the repository").root;
+        let read =
+            |file: &str| std::fs::read_to_string(root.join(file)).expect("it is part of the repository");
+        let manifest: toml::Table = read("tests/fuzz/Cargo.toml").parse().expect("a manifest");
+        let workflow = read(".github/workflows/fuzz.yml");
+        for target in manifest["bin"].as_array().expect("there are targets") {
+            let name = target["name"].as_str().expect("a target has a name");
+            assert!(workflow.contains(&format!("          - {name}\n")), "{name}");
+        }
     }
 
     #[test]
