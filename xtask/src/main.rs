@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod bench;
+mod book;
 mod budgets;
 mod chromium;
 mod command;
@@ -89,6 +90,12 @@ enum Task {
     Python,
     /// Build the Python wheels of a release: manylinux2014, x86-64 and aarch64.
     Wheels,
+    /// Check the documents, and build them as a book with the documentation of the code beside it.
+    Book {
+        /// Do not ask before installing mdbook.
+        #[arg(long)]
+        yes: bool,
+    },
     /// Write the components of each program: every third-party crate with version, licence and
     /// checksum (CycloneDX).
     Sbom,
@@ -143,6 +150,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Flash { detach } => flash::run(&project, detach),
         Task::Python => python::run(&project).map(|remark| println!("{remark}")),
         Task::Wheels => wheels::run(&project),
+        Task::Book { yes } => book::run(&project, consent::Consent::new(yes)),
         Task::Sbom => sbom::run(&project),
         Task::Parity => parity::run(&project),
         Task::Accuracy { tables } => accuracy::run(&project, &tables),

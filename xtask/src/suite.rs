@@ -5,7 +5,7 @@ use crate::firmware;
 use crate::project::{EMULATED_BOARD, Project};
 use crate::tests_run::{self, Scope};
 use crate::toolchain::Toolchain;
-use crate::{budgets, command, emulator, layout, lint, python, setup};
+use crate::{book, budgets, emulator, layout, lint, python, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::fmt::Write;
@@ -231,10 +231,7 @@ fn wheel(run: &mut Run) -> Result<String> {
 }
 
 fn docs(run: &mut Run) -> Result<String> {
-    let mut cargo = command::cargo(&run.project.root);
-    // In release, like clippy, so that the dependencies' metadata is already available.
-    cargo.env("RUSTDOCFLAGS", "-Dwarnings").args(["doc", "--workspace", "--no-deps", "--release"]);
-    command::run(&mut cargo).context("the documentation has faults: each one above names its file")?;
+    book::code(run.project)?;
     Ok(String::new())
 }
 

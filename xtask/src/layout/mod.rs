@@ -7,7 +7,7 @@ mod cycles;
 mod equations;
 mod layers;
 mod modules;
-mod pages;
+pub mod pages;
 mod policy;
 
 use crate::project::Project;
