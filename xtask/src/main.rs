@@ -7,6 +7,7 @@
 
 mod accuracy;
 mod bench;
+mod book;
 mod budgets;
 mod chromium;
 mod command;
@@ -16,8 +17,8 @@ mod environment;
 mod firmware;
 mod flash;
 mod flat;
-mod house;
 mod jobs;
+mod layout;
 mod lint;
 mod locks;
 mod packages;
@@ -67,8 +68,10 @@ enum Task {
     FmtCheck,
     /// Run clippy on both workspaces with warnings as errors, and compare their locks.
     Lint,
-    /// Check the structural rules: crate graph, circular imports of files, equations, licences.
-    House,
+    /// Check the structural rules: crate graph, circular imports of files, equations, licences,
+    /// links.
+    #[command(alias = "house")]
+    Layout,
     /// Run all checks that must pass before a change is merged.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Test(suite::Options),
@@ -87,6 +90,12 @@ enum Task {
     Python,
     /// Build the Python wheels of a release: manylinux2014, x86-64 and aarch64.
     Wheels,
+    /// Check the documents, and build them as a book with the documentation of the code beside it.
+    Book {
+        /// Do not ask before installing mdbook.
+        #[arg(long)]
+        yes: bool,
+    },
     /// Write the components of each program: every third-party crate with version, licence and
     /// checksum (CycloneDX).
     Sbom,
@@ -134,13 +143,14 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Firmware { board } => firmware::command(&project, board.as_deref()),
         Task::FmtCheck => lint::formatting(&project),
         Task::Lint => lint::all(&project),
-        Task::House => house::check(&project),
+        Task::Layout => layout::check(&project),
         Task::Test(options) => suite::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
         Task::Python => python::run(&project).map(|remark| println!("{remark}")),
         Task::Wheels => wheels::run(&project),
+        Task::Book { yes } => book::run(&project, consent::Consent::new(yes)),
         Task::Sbom => sbom::run(&project),
         Task::Parity => parity::run(&project),
         Task::Accuracy { tables } => accuracy::run(&project, &tables),

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub fn run(project: &Project) -> Result<()> {
     let python = python(project)?;
     let mut cargo = command::cargo(&project.root);
-    cargo.args(["bench", "-p", "jointrig", "--bench", "peers"]);
+    cargo.args(["bench", "-p", "jointrig-benches", "--bench", "parity"]);
     cargo.env("JOINTRIG_PYTHON", python);
     command::run(&mut cargo)
 }
@@ -25,7 +25,7 @@ fn python(project: &Project) -> Result<PathBuf> {
             "there is no Python: install python3 with its venv module, or leave the parity check to others"
         );
     };
-    let python = environment(&system, &project.root.join("target/parity-python"), &[])?;
+    let python = environment(&system, &project.target.join("parity-python"), &[])?;
     println!("pyFBS is installed without its dependencies: of it, only virtual points and SEMM are compared");
     environment::with_peers(&python)?;
     Ok(python)

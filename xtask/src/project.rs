@@ -32,13 +32,13 @@ pub struct Project {
 }
 
 /// Cargo's description of a package.
-#[derive(Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Package {
     /// The name for cargo's `-p`.
     pub name: String,
     /// The root files of its library and its binaries.
     pub roots: Vec<PathBuf>,
-    /// Its dependencies, without those that only tests need.
+    /// Its dependencies.
     pub dependencies: Vec<Dependency>,
     /// Its features, including the implicit ones of optional dependencies.
     pub features: Vec<String>,
@@ -51,12 +51,14 @@ pub struct Package {
 }
 
 /// A dependency of a package.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Dependency {
     /// The package's name.
     pub name: String,
     /// Whether it is enabled only by a feature.
     pub optional: bool,
+    /// Whether only tests, examples and benchmarks need it.
+    pub only_for_tests: bool,
 }
 
 impl Project {
@@ -89,10 +91,15 @@ impl Project {
         folder.join("Cargo.toml").is_file().then_some(folder)
     }
 
+    /// The packages of the boards' workspace.
+    pub fn board_packages(&self) -> Result<Vec<Package>> {
+        let Some(folder) = self.boards_root() else { return Ok(Vec::new()) };
+        Ok(packages(&metadata(&folder)?))
+    }
+
     /// The boards: the packages of the boards' workspace that have a binary.
     pub fn boards(&self) -> Result<Vec<Package>> {
-        let Some(folder) = self.boards_root() else { return Ok(Vec::new()) };
-        let mut boards = packages(&metadata(&folder)?);
+        let mut boards = self.board_packages()?;
         boards.retain(|package| !package.binaries.is_empty());
         Ok(boards)
     }
@@ -128,16 +135,16 @@ fn packages(metadata: &Value) -> Vec<Package> {
                     .collect()
             };
             let of_kind = |kind| texts(kind, "name");
-            let roots = ["lib", "bin"].iter().flat_map(|kind| texts(kind, "src_path"));
+            let roots = ["lib", "cdylib", "bin"].iter().flat_map(|kind| texts(kind, "src_path"));
             Package {
                 name: package["name"].as_str().unwrap_or_default().to_owned(),
                 roots: roots.map(PathBuf::from).collect(),
                 dependencies: list(&package["dependencies"])
                     .iter()
-                    .filter(|dependency| dependency["kind"] != "dev")
                     .map(|dependency| Dependency {
                         name: dependency["name"].as_str().unwrap_or_default().to_owned(),
                         optional: dependency["optional"] == true,
+                        only_for_tests: dependency["kind"] == "dev",
                     })
                     .collect(),
                 features: package["features"]
@@ -176,7 +183,10 @@ mod tests {
         let expected = Package {
             name: "nucleo-u5a5".into(),
             roots: vec!["/src/lib.rs".into(), "/src/main.rs".into()],
-            dependencies: vec![Dependency { name: "defmt".into(), optional: true }],
+            dependencies: vec![
+                Dependency { name: "defmt".into(), optional: true, only_for_tests: false },
+                Dependency { name: "proptest".into(), optional: false, only_for_tests: true },
+            ],
             features: vec!["default".into(), "defmt".into()],
             binaries: vec!["nucleo-u5a5".into()],
             examples: vec!["blink".into()],
@@ -194,8 +204,21 @@ mod tests {
         let oldest =
             manifest["workspace"]["package"]["rust-version"].as_str().expect("it is stated").to_owned();
         let workflow = read(".github/workflows/ci.yml");
-        assert!(workflow.contains(&format!("toolchain: [stable, \"{oldest}\"]")), "{oldest}");
+        assert!(workflow.contains(&format!("RUSTUP_TOOLCHAIN: \"{oldest}\"")), "{oldest}");
         assert!(workflow.contains("\n      - run: cargo xtask test\n"));
+    }
+
+    #[test]
+    fn the_public_ci_runs_every_fuzz_target() {
+        let root = Project::locate().expect("the tests run inside the repository").root;
+        let read =
+            |file: &str| std::fs::read_to_string(root.join(file)).expect("it is part of the repository");
+        let manifest: toml::Table = read("tests/fuzz/Cargo.toml").parse().expect("a manifest");
+        let workflow = read(".github/workflows/fuzz.yml");
+        for target in manifest["bin"].as_array().expect("there are targets") {
+            let name = target["name"].as_str().expect("a target has a name");
+            assert!(workflow.contains(&format!("          - {name}\n")), "{name}");
+        }
     }
 
     #[test]

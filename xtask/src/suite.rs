@@ -5,7 +5,7 @@ use crate::firmware;
 use crate::project::{EMULATED_BOARD, Project};
 use crate::tests_run::{self, Scope};
 use crate::toolchain::Toolchain;
-use crate::{budgets, command, emulator, house, lint, python, setup};
+use crate::{book, budgets, emulator, layout, lint, python, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::fmt::Write;
@@ -54,10 +54,10 @@ const STEPS: [Step; 10] = [
     },
     Step { name: "fmt-check", purpose: "the code is formatted", slow: false, action: formatting },
     Step {
-        name: "house",
-        purpose: "crate graph, circles of files, equations, licences",
+        name: "layout",
+        purpose: "crate graph, import cycles, equations, licences, links",
         slow: false,
-        action: house_rules,
+        action: layout_rules,
     },
     // Clippy on the boards compiles the no_std libraries for the microcontroller, with the features
     // of each board.
@@ -206,8 +206,8 @@ fn formatting(run: &mut Run) -> Result<String> {
     Ok(String::new())
 }
 
-fn house_rules(run: &mut Run) -> Result<String> {
-    house::check(run.project)?;
+fn layout_rules(run: &mut Run) -> Result<String> {
+    layout::check(run.project)?;
     Ok(String::new())
 }
 
@@ -231,10 +231,7 @@ fn wheel(run: &mut Run) -> Result<String> {
 }
 
 fn docs(run: &mut Run) -> Result<String> {
-    let mut cargo = command::cargo(&run.project.root);
-    // In release, like clippy, so that the dependencies' metadata is already available.
-    cargo.env("RUSTDOCFLAGS", "-Dwarnings").args(["doc", "--workspace", "--no-deps", "--release"]);
-    command::run(&mut cargo).context("the documentation has faults: each one above names its file")?;
+    book::code(run.project)?;
     Ok(String::new())
 }
 
@@ -294,6 +291,6 @@ mod tests {
     #[test]
     fn quick_keeps_the_lints_which_compile_for_the_microcontroller() {
         let kept: Vec<&str> = STEPS.iter().filter(|step| !step.slow).map(|step| step.name).collect();
-        assert_eq!(kept, ["setup", "fmt-check", "house", "lint", "build", "test"]);
+        assert_eq!(kept, ["setup", "fmt-check", "layout", "lint", "build", "test"]);
     }
 }

@@ -4,7 +4,7 @@
 //! | to add or change | where |
 //! |---|---|
 //! | a field of the plan | [`plan`], its rule in `plan/check.rs` |
-//! | a column, a table | [`store`]: next to the row's type in its `*_table.rs` or `record_row.rs` |
+//! | a column, a table | [`store`]: next to the row's type in its `*_table.rs` |
 //! | a verdict, the double-hit threshold | [`verdict`] |
 //! | what happens between two hits | [`run`]: `cell.rs` |
 //! | a level of the shaker | [`run::shaking`] |

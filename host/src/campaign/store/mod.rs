@@ -10,8 +10,8 @@
 //!
 //! Each table's columns are declared once, with the `table!` macro of `table.rs`, next to the type
 //! of its row: a new column is one new line there (and its value where the row is constructed). A
-//! new table is a new `*_table.rs` and a line in `schema.rs`. The rows are: `record_row.rs`
-//! (records and their seals), `overrules.rs`, `cell_table.rs`, `session_table.rs` (sessions,
+//! new table is a new `*_table.rs` and a line in `schema.rs`. The rows are: `record_table.rs`
+//! (records, their seals, overrules), `cell_table.rs`, `session_table.rs` (sessions,
 //! channels, sensors), `level_table.rs`, `frf_table.rs`, `notes.rs` (plans, log).
 //!
 //! Checks whether the open file is still the one with its name. A file that was replaced, removed

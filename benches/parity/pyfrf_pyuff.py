@@ -1,4 +1,4 @@
-"""The peers' side of the parity check: argv[1] is the folder that peers.rs has filled and reads afterwards."""
+"""The peers' side of the parity check: argv[1] is the folder that pyfrf_pyuff.rs has filled and reads afterwards."""
 
 import json
 import os

@@ -35,7 +35,7 @@ pub fn run(python: &str) -> Outcome {
     records(folder)?;
     let ours = sets();
     std::fs::write(folder.join("ours.uff"), write(&ours)?)?;
-    script(python, "parity.py", &folder.display().to_string())?;
+    script(python, "pyfrf_pyuff.py", &folder.display().to_string())?;
     let answer: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("answer.json"))?)?;
     println!("| against | what | largest difference | allowed |");
     println!("|---|---|---|---|");
@@ -66,7 +66,7 @@ pub fn run(python: &str) -> Outcome {
 
 /// Windowed records and our estimates of them.
 fn records(folder: &Path) -> Outcome {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/impacts/good.npz");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../host/tests/data/impacts/good.npz");
     let records = read_impacts(Path::new(path))?;
     let (samples, window) = (records.force_n[0].len(), Windowing::default());
     let decay = window.decay(records.fs_hz, samples);

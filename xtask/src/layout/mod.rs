@@ -1,38 +1,35 @@
-//! `cargo xtask house`: structural rules that a program can check, in seconds and without compiling
-//! anything.
+//! `cargo xtask layout`: structural rules that a program can check, in seconds and without
+//! compiling anything.
 
-mod circles;
-mod declarations;
+mod allowed_imports;
+mod crates;
+mod cycles;
 mod equations;
-mod features;
-mod graph;
+mod layers;
 mod modules;
-mod pages;
+pub mod pages;
 mod policy;
-mod rooms;
-mod tokens;
 
 use crate::project::Project;
 use anyhow::{Result, bail};
 
 /// One rule: its name, and its check, which returns a remark.
-type Law = (&'static str, fn(&Project) -> Result<String>);
+type Rule = (&'static str, fn(&Project) -> Result<String>);
 
-const LAWS: [Law; 7] = [
-    ("which crate uses which", graph::check),
-    ("files in circles", circles::check),
-    ("the host's rooms", rooms::check),
+const RULES: [Rule; 6] = [
+    ("which crate uses which", crates::check),
+    ("import cycles of files", cycles::check),
+    ("layers of the host", layers::check),
     ("equations", equations::check),
     ("licences, bans, sources", policy::check),
-    ("features", features::check),
     ("pages", pages::check),
 ];
 
 /// Checks all rules, and fails with all violations found.
 pub fn check(project: &Project) -> Result<()> {
     let mut faults = Vec::new();
-    for (name, law) in LAWS {
-        match law(project) {
+    for (name, rule) in RULES {
+        match rule(project) {
             Ok(remark) => println!("  {name}: {remark}"),
             Err(error) => faults.push(format!("{name}: {error:#}")),
         }
@@ -40,5 +37,5 @@ pub fn check(project: &Project) -> Result<()> {
     if faults.is_empty() {
         return Ok(());
     }
-    bail!("the house is not in order:\n  {}", faults.join("\n  "))
+    bail!("the layout breaks these rules:\n  {}", faults.join("\n  "))
 }

@@ -3,8 +3,8 @@
 //!
 //! `cargo xtask parity` prepares Python with pyFRF, pyuff and pyFBS and starts this program.
 
-mod parity;
-mod pyfbs_parity;
+mod pyfbs;
+mod pyfrf_pyuff;
 
 use std::process::{Command, ExitCode};
 
@@ -15,7 +15,7 @@ fn main() -> ExitCode {
         eprintln!("nothing compared: JOINTRIG_PYTHON names no interpreter; run `cargo xtask parity`");
         return ExitCode::SUCCESS;
     };
-    match both(parity::run(&python), pyfbs_parity::run(&python)) {
+    match both(pyfrf_pyuff::run(&python), pyfbs::run(&python)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
@@ -32,9 +32,9 @@ fn both(first: Outcome, second: Outcome) -> Outcome {
     }
 }
 
-/// Runs a script of the folder `peers` and returns its output.
+/// Runs a script of this folder and returns its output.
 fn script(python: &str, name: &str, argument: &str) -> Result<String, Box<dyn std::error::Error>> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/parity/");
     let output = Command::new(python).arg(format!("{path}{name}")).arg(argument).output()?;
     if !output.status.success() {
         return Err(format!("{name} failed:\n{}", String::from_utf8_lossy(&output.stderr)).into());

@@ -1,7 +1,7 @@
 //! The hot paths of substructuring: all methods on a campaign's lines, the fit, and the bootstrap
 //! of 1000 replicates.
 //!
-//!     cargo bench -p jointrig --bench substructuring
+//!     cargo bench -p jointrig-benches --bench substructuring
 
 use divan::Bencher;
 use jointrig::exchange::{read_frf, read_positions};
@@ -12,9 +12,8 @@ use jointrig::substructuring::{Band, Frf, IdmSet, Method, identify};
 use nalgebra::Complex;
 use std::path::{Path, PathBuf};
 
-#[cfg(feature = "sim")]
 #[expect(dead_code, reason = "the rest is for the tables of the tests")]
-#[path = "../tests/it/simulated/mod.rs"]
+#[path = "../../host/tests/it/simulated/mod.rs"]
 mod simulated;
 
 fn main() {
@@ -22,7 +21,7 @@ fn main() {
 }
 
 fn data(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host/tests/data").join(file)
 }
 
 fn geometry() -> Geometry {
@@ -51,7 +50,6 @@ fn all_methods_on_3600_lines(bencher: Bencher) {
 /// 900 geometry errors. The gain of its optimised weights over a direct implementation of the
 /// formulas is printed by `cargo test --release -p jointrig-analysis --lib speed_of_the_weights --
 /// --ignored --nocapture`.
-#[cfg(feature = "sim")]
 #[divan::bench(sample_count = 3)]
 fn fit_over_the_main_band(bencher: Bencher) {
     let c = simulated::campaign(&simulated::rigid_rig(180e6), 0.05e-6, 1, [300.0, 600.0]);

@@ -27,7 +27,7 @@ const SEMM_INPUTS: [&str; 4] = ["AZ1", "AZ2", "AZ3", "AY3"];
 const WEIGHTS: [f64; 9] = [1.0, 2.0, 0.5, 3.0, 1.5, 0.25, 1.0, 4.0, 0.75];
 
 fn data(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host/tests/data").join(file)
 }
 
 /// The comparisons and their results.
@@ -82,7 +82,7 @@ pub fn run(python: &str) -> Outcome {
         "data": data(""), "folder": folder.path(), "weights": WEIGHTS,
         "semm_outputs": SEMM_OUTPUTS, "semm_inputs": SEMM_INPUTS,
     });
-    script(python, "pyfbs_parity.py", &job.to_string())?;
+    script(python, "pyfbs.py", &job.to_string())?;
     let mut table = Table { theirs: NpzFile::open(&folder.path().join("pyfbs.npz"))?, worst: Vec::new() };
     let geometry = read_positions(&data("positions/positions.xlsx"))?.geometry;
     println!("| against | what | largest difference | allowed |");
