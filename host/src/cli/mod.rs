@@ -3,9 +3,6 @@
 //! `--json` prints exactly one document to stdout and nothing else; progress, prompts and messages
 //! go to stderr. An error is one to a few lines: what failed, where, what to do.
 //!
-//! `analyse-for-page`: started by the live page's process to analyse a campaign in a separate
-//! process. Hidden, since users do not call it.
-//!
 //! `completions`: prints a shell's completion script.
 //!
 //! `man`: prints the manual page, or writes one for each command.
@@ -14,6 +11,7 @@
 
 use crate::live::forming::analyse_for_another;
 use crate::untrusted_text::{tell_line, visible};
+use analyse_for_page::AnalyseForPage;
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::CliError;
@@ -22,6 +20,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 mod analyse;
+#[cfg(feature = "dashboard")]
+mod analyse_for_page;
 mod campaign;
 mod demo;
 mod error;
@@ -34,6 +34,8 @@ mod identify;
 mod import;
 mod info;
 mod measure;
+#[cfg(feature = "dashboard")]
+mod open_page;
 mod output;
 mod page;
 mod plan;
@@ -161,23 +163,6 @@ fn start_log(verbose: u8) {
         writeln!(to, "[{time} {level:<5} {from}] {}", visible(&record.args().to_string()))
     });
     builder.init();
-}
-
-/// Print the result of an analysis, for the live page; ends when the input is closed.
-#[derive(Debug, Args)]
-pub struct AnalyseForPage {
-    /// The campaign file.
-    file: PathBuf,
-    /// The newest record's id.
-    last: i64,
-}
-
-impl AnalyseForPage {
-    fn run(self) -> Result<(), CliError> {
-        analyse_for_another(&self.file, self.last, &mut std::io::stdout().lock()).map_err(|source| {
-            CliError::File { path: self.file, doing: "analysing for the live page", source }
-        })
-    }
 }
 
 /// Print completions for a shell.

@@ -9,8 +9,8 @@ use clap::Args;
 
 use super::campaign::run::Run;
 use super::error::CliError;
+use super::open_page::Opened;
 use super::output;
-use super::page::Opened;
 use super::page::Page;
 use crate::campaign::store::is_simulated_board;
 use crate::campaign::watch::Seen;

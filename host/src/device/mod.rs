@@ -16,6 +16,8 @@ mod qemu;
 mod requests;
 mod serial;
 pub mod session;
+#[cfg(feature = "sim")]
+mod sim;
 pub mod stream;
 pub mod tap;
 pub mod transport;
