@@ -2,14 +2,9 @@
 //! process. Hidden, since users do not call it.
 
 use super::error::CliError;
-use super::{campaign, page};
 use crate::live::forming::analyse_for_another;
-use crate::untrusted_text::{tell_line, visible};
-use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
-use clap_complete::Shell;
-use std::io::Write;
+use clap::Args;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Print the result of an analysis, for the live page; ends when the input is closed.
 #[derive(Debug, Args)]
@@ -21,7 +16,7 @@ pub struct AnalyseForPage {
 }
 
 impl AnalyseForPage {
-    fn run(self) -> Result<(), CliError> {
+    pub(super) fn run(self) -> Result<(), CliError> {
         analyse_for_another(&self.file, self.last, &mut std::io::stdout().lock()).map_err(|source| {
             CliError::File { path: self.file, doing: "analysing for the live page", source }
         })

@@ -9,8 +9,8 @@
 //!
 //! Tunes the system's allocator for short-lived signals and matrices.
 
-use crate::live::forming::analyse_for_another;
 use crate::untrusted_text::{tell_line, visible};
+#[cfg(feature = "dashboard")]
 use analyse_for_page::AnalyseForPage;
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;

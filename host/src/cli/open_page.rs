@@ -4,21 +4,12 @@
 //! secret. Therefore the browser is given the name of a file that only its owner can read; that
 //! file redirects to the address, and is removed with the page.
 
-use super::error::CliError;
-use crate::campaign::run::answers::{Answers, Edits};
-use crate::campaign::watch::Watchers;
-#[cfg(feature = "dashboard")]
-use crate::dashboard::{Dashboard, Measuring};
-use crate::device::tap::Tap;
 use crate::untrusted_text::tell_line;
-use clap::Args;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// The redirecting file, which exists as long as the page is served.
 pub struct Opened {

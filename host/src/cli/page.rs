@@ -1,19 +1,17 @@
 //! `--serve`: a live page for a command that measures.
 
 use super::error::CliError;
+#[cfg(feature = "dashboard")]
 use super::open_page::Opened;
 use crate::campaign::run::answers::{Answers, Edits};
 use crate::campaign::watch::Watchers;
 #[cfg(feature = "dashboard")]
 use crate::dashboard::{Dashboard, Measuring};
 use crate::device::tap::Tap;
+#[cfg(feature = "dashboard")]
 use crate::untrusted_text::tell_line;
 use clap::Args;
-use std::fs::{File, OpenOptions};
-use std::io;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 

@@ -12,14 +12,9 @@
 //! `tcp:HOST:PORT`: a device connected by a socket (a virtual board, or a bridge).
 
 use super::error::DeviceError;
+#[cfg(feature = "sim")]
 use super::sim::Sim;
 use super::transport::{Simulated, Transport};
-use base64::Engine as _;
-use base64::prelude::BASE64_STANDARD;
-use jointrig_hil_sim::board::{Options, VirtualBoard};
-use jointrig_hil_sim::link::HostEnd;
-use jointrig_hil_sim::rig::RigConfig;
-use sha2::{Digest, Sha256};
 use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};

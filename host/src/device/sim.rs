@@ -12,12 +12,10 @@ use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;
 use sha2::{Digest, Sha256};
-use std::io::{Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
+
+use std::path::Path;
 use std::time::Duration;
-use std::{fmt, io};
+use std::io;
 
 /// A running virtual board.
 pub struct Sim {
