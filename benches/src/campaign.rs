@@ -7,7 +7,7 @@ use jointrig::analyse::{CampaignFile, Wanted, analyse};
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::address::Address;
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 use jointrig::structure::Structure;
 use jointrig_tests::campaign::{plan, run};
 use peak_alloc::PeakAlloc;

@@ -3,9 +3,9 @@
 
 use super::noise::numbers;
 use super::row::{RUNS, Row, quickest};
-use jointrig::device::address::Transport;
 use jointrig::device::link::Link;
 use jointrig::device::stream::Stream;
+use jointrig::device::transport::Transport;
 use jointrig_protocol::block::{Block, Header};
 use jointrig_protocol::frame::{Frame, Kind, Writer, encode};
 use jointrig_protocol::hello::{Hello, Role};

@@ -6,16 +6,14 @@
 //! carried out immediately afterwards.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use embassy_time::Instant;
 use jointrig_hot::range;
 use jointrig_protocol::block::{OVER_RANGE, TRIGGER};
-use jointrig_protocol::event::{Event, Loss, Reason};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
 use crate::Core;
 use crate::board::{Coil, Delivered, Drive, Inputs, Scans};
 use crate::hammer::{CoilOrder, Scanned};
-use crate::ring::Range;
+use crate::safety::{Driven, Orders};
 use crate::state::State;
 
 /// Unsent blocks at which the transmit task is woken: waking it costs a tenth of the processing of
@@ -53,10 +51,7 @@ pub async fn acquire<M: RawMutex, S: Scans, C: Coil, D: Drive, I: Inputs>(
         if given.drive_off {
             drive.rest();
         } else if given.codes > 0 && drive.play(&codes[..given.codes]).is_err() {
-            core.with(|state| {
-                let stops = state.shaker.halt(Reason::RanDry);
-                state.tell_of_shaker(stops);
-            });
+            core.with(|state| state.safety().drive_ran_dry());
         } else if given.last {
             // ignored: a drive that has just accepted codes also accepts their end
             let _ = drive.play(&[]);
@@ -122,11 +117,7 @@ impl<M: RawMutex> Core<'_, M> {
     /// clock change or raise the sync output.
     async fn wait_until_it_may_run(&self) -> bool {
         loop {
-            let (runs, due) = self.with(|state| {
-                let ahead = state.next_scan.saturating_sub(state.acknowledged);
-                let runs = state.streaming && ahead < u64::from(state.ring.capacity_scans() / 2);
-                (runs || state.clock_is_measured(), state.in_step.is_due())
-            });
+            let (runs, due) = self.with(|state| (state.may_scan(), state.in_step().is_due()));
             if due {
                 return false;
             }
@@ -150,15 +141,9 @@ impl<M: RawMutex> Core<'_, M> {
             self.report_fault(fault);
         }
         if let Some(slow) = inputs.slow() {
-            self.with(|state| state.take_slow(slow));
+            self.with(|state| state.safety().take_slow(slow));
         }
-        self.with(|state| {
-            if state.emergency_stop && !pressed && reset {
-                state.emergency_stop = false;
-                state.say(Event::EmergencyStop(false));
-            }
-            state.heed(closed, pressed);
-        });
+        self.with(|state| state.safety().poll_inputs(closed, pressed, reset));
     }
 
     /// Processes one delivered block and writes the codes for the drive.
@@ -169,15 +154,10 @@ impl<M: RawMutex> Core<'_, M> {
         let over = delivered.loud && range::is_over(pairs);
         self.with(|state| {
             let given = state.take(delivered, channels, pairs, over, samples, codes);
-            let send = state.ring.unsent() >= BLOCKS_PER_WAKE || state.has_words();
-            let sync = state.in_step.is_due();
-            Given {
-                coil: state.coil.take(),
-                drive_off: core::mem::take(&mut state.drive_off),
-                send,
-                sync,
-                ..given
-            }
+            let send = state.unsent_blocks() >= BLOCKS_PER_WAKE || state.has_words();
+            let sync = state.in_step().is_due();
+            let Orders { coil, drive_off } = state.safety().take_orders();
+            Given { coil, drive_off, send, sync, ..given }
         })
     }
 }
@@ -194,50 +174,24 @@ impl State<'_> {
         samples: &[u8; BLOCK_SAMPLE_BYTES],
         codes: &mut [i16],
     ) -> Given {
-        self.last_block = Instant::now();
+        self.safety().scans_arrived();
         if delivered.missed > 0 {
-            self.miss(delivered.missed);
+            self.lose_scans(delivered.missed);
         }
-        let block = InHand { first_scan: self.next_scan, channels, samples: pairs };
+        let block = InHand { first_scan: self.safety().next_scan(), channels, samples: pairs };
         let scans = block.scans();
         if scans == 0 {
             return Given::default();
         }
-        // a disarmed hammer yields no outcome, which saves handling an empty one of 80 bytes
-        let outcome = (!self.hammer.is_disarmed()).then(|| self.hammer.block(&block, self.friction.as_ref()));
+        let outcome = self.judge(&block);
         let trigger = outcome.as_ref().is_some_and(|outcome| outcome.trigger);
         let flags = if over { OVER_RANGE } else { 0 } | if trigger { TRIGGER } else { 0 };
-        if self.streaming {
-            let dropped = self.ring.push(self.next_scan, flags, scans as u8, samples);
-            self.counters.scans_dropped += dropped;
-            self.counters.scans_produced += scans as u64;
-        } else if let Some(friction) = &self.friction {
-            // while streaming, the ring holds the last block and the mean is computed on request
-            self.friction_n = friction.mean_of(pairs, channels);
-        }
-        let moves = self.shaker.moves();
-        if moves {
-            let events = self.shaker.block(&block, &mut codes[..scans]);
-            self.tell_of_shaker(events.into_iter().flatten());
-        }
-        self.next_scan += scans as u64;
+        self.keep(flags, scans, samples, pairs, channels);
+        let Driven { codes, last } = self.safety().drive(&block, codes);
+        self.safety().advance(scans as u64);
         if let Some(outcome) = &outcome {
-            self.tell(outcome);
+            self.follow(outcome);
         }
-        let last = moves && !self.shaker.moves();
-        Given { codes: if moves { scans } else { 0 }, last, ..Given::default() }
-    }
-
-    /// Accounts for scans that the front end did not deliver; the scan index advances over them.
-    #[inline(never)]
-    fn miss(&mut self, missed: u32) {
-        // nothing may move without the data of these scans
-        self.bring_to_rest(Reason::FrontEnd);
-        self.counters.scans_missed += u64::from(missed);
-        if self.streaming {
-            let range = Range { first_scan: self.next_scan, scans: u64::from(missed) };
-            self.ring.report(range, Loss::FrontEnd);
-        }
-        self.next_scan += u64::from(missed);
+        Given { codes, last, ..Given::default() }
     }
 }

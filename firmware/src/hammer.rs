@@ -171,7 +171,7 @@ impl Hammer {
             || longest > minute
             || trigger.listen_scans == 0
         {
-            return Err(crate::refusal::out_of_bounds(
+            return Err(crate::sentence::out_of_bounds(
                 "trigger: the level must be a force above 0 N, and no time longer than a minute",
             ));
         }
@@ -189,7 +189,7 @@ impl Hammer {
             return Err(Refusal::Unsupported);
         }
         if valid_ms == 0 || valid_ms > ARM_VALID_CAP_MS {
-            return Err(crate::refusal::out_of_bounds("arming must be valid for 1 to 60000 ms"));
+            return Err(crate::sentence::out_of_bounds("arming must be valid for 1 to 60000 ms"));
         }
         match self.state {
             // arming is allowed during the hold-off time: the next shot waits for its end
@@ -222,7 +222,7 @@ impl Hammer {
         if order.quiet_limits.iter().any(|limit| !limit.is_finite() || *limit < 0.0)
             || order.quiet_limits.len() > self.units_per_code.len()
         {
-            return Err(crate::refusal::out_of_bounds(
+            return Err(crate::sentence::out_of_bounds(
                 "quiet limits must be finite, not negative, and no more than there are channels",
             ));
         }

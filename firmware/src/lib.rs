@@ -16,6 +16,9 @@
 //! - [`watch::watch`] disarms the hammer and stops the shaker when the host falls silent, and
 //!   reports counters.
 //!
+//! What moves belongs to [`safety`]: one file states what forbids motion, who sets and who clears
+//! it, and in which order.
+//!
 //! The scan index is the only time base for results; `embassy-time` is used for timeouts. Results
 //! never depend on the order in which an executor polls the four tasks.
 #![no_std]
@@ -29,9 +32,6 @@ pub mod feed;
 mod fmt;
 pub mod friction;
 pub mod hammer;
-mod in_step;
-mod judging;
-pub mod lock_in;
 pub mod lockstep;
 pub mod logs;
 pub mod memory;
@@ -39,21 +39,17 @@ pub mod processor_fault;
 pub mod pulse;
 pub mod quiet;
 pub mod receive;
-mod refusal;
-pub mod relay;
-pub mod report;
 mod requests;
 pub mod ring;
 pub mod ruler;
+pub mod safety;
 mod scales;
 mod scan_time;
 pub mod sentence;
 pub mod servo;
 pub mod shaker;
-pub mod sine;
-pub mod slow;
 mod state;
-mod supplies;
+pub mod supplies;
 mod sync;
 pub mod transmit;
 #[cfg(feature = "usb")]

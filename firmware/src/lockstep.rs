@@ -21,8 +21,7 @@
 //!
 //! Heads and tails count bytes since the start, modulo 2³²; everything is little-endian.
 
-use crate::ad7606b::alignment::{Clock, Moment};
-use crate::ad7606b::trouble::Trouble;
+use crate::ad7606b::reader::{Clock, Moment, Trouble};
 use crate::board::Seen;
 use crate::ruler::{Ago, Span};
 use heapless::Vec;

@@ -1,7 +1,6 @@
 //! Receiving: finds frames in the incoming bytes and carries out their requests.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use embassy_time::Instant;
 use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::answer::{Numbered, Refusal};
 use jointrig_protocol::event::Reason;
@@ -12,7 +11,8 @@ use jointrig_protocol::request;
 use crate::Core;
 use crate::board::{ByteSource, Stage};
 use crate::fmt::{info, warning};
-use crate::memory::{Memory, Seen};
+use crate::memory::Seen;
+use crate::state::State;
 
 /// Runs forever.
 pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
@@ -34,7 +34,7 @@ pub async fn receive<M: RawMutex, S: ByteSource, P: Stage>(
             let (used, found) = accumulator.feed(rest);
             match found {
                 Some(Ok(frame)) => core.hear(&frame, stage),
-                Some(Err(_)) => core.with(|state| state.counters.frames_bad += 1),
+                Some(Err(_)) => core.with(State::count_bad_frame),
                 None => {}
             }
             rest = &rest[used..];
@@ -46,23 +46,20 @@ impl<M: RawMutex> Core<'_, M> {
     /// Call when the link is cut: its host can no longer cancel its requests, so everything that
     /// moves comes to rest. For a board that detects this by means other than its byte source.
     pub fn link_is_cut(&self) {
-        self.with(|state| state.bring_to_rest(Reason::LinkLost));
+        self.with(|state| state.safety().bring_to_rest(Reason::LinkLost));
         self.to_send.signal(());
     }
 
     /// Processes one valid frame from the host.
     fn hear(&self, frame: &Frame<'_>, stage: &mut impl Stage) {
-        self.with(|state| {
-            state.counters.frames_in += 1;
-            state.last_heard = Instant::now();
-        });
+        self.with(State::hear_frame);
         match frame.kind {
             Kind::Hello => self.greet(frame.payload),
             Kind::Request => self.hear_request(frame.payload, stage),
             Kind::Acknowledge => self.hear_acknowledge(frame.payload),
             // kinds that only a device sends, from a faulty host
             Kind::Answer | Kind::Event | Kind::Samples | Kind::Log => {
-                self.with(|state| state.counters.frames_bad += 1);
+                self.with(State::count_bad_frame);
             }
         }
     }
@@ -72,28 +69,18 @@ impl<M: RawMutex> Core<'_, M> {
     /// one and stops its actions.
     pub(crate) fn greet(&self, payload: &[u8]) {
         let Ok(theirs) = Hello::from_bytes(payload) else {
-            self.with(|state| state.counters.frames_bad += 1);
+            self.with(State::count_bad_frame);
             return;
         };
         let ours = Hello::device(theirs.session, self.facts.boot, 0);
         let agreed = theirs.role == Role::Host && ours.check(&theirs).is_ok();
         self.with(|state| {
-            state.hello_due = Some(theirs.session);
-            if agreed && state.session == Some(theirs.session) {
+            state.owe_hello(theirs.session);
+            if agreed && state.session() == Some(theirs.session) {
                 return;
             }
-            state.packets = agreed && theirs.packets;
-            state.bring_to_rest(Reason::StreamEnded);
-            state.streaming = false;
-            state.answers.clear();
-            state.resends.clear();
-            // only after hammer and shaker have reported how they came to rest
-            state.events.begin_session();
-            state.ring.forget_losses();
-            state.memory = Memory::new();
-            state.forget_scales(self.facts.channels);
-            state.forget_clock();
-            state.session = agreed.then_some(theirs.session);
+            let session = agreed.then_some(theirs.session);
+            state.begin_session(session, agreed && theirs.packets, self.facts.channels);
             if agreed {
                 info!("session {}", theirs.session);
             } else {
@@ -105,21 +92,15 @@ impl<M: RawMutex> Core<'_, M> {
 
     fn hear_acknowledge(&self, payload: &[u8]) {
         let Some(acknowledge) = Acknowledge::from_bytes(payload) else {
-            self.with(|state| state.counters.frames_bad += 1);
+            self.with(State::count_bad_frame);
             return;
         };
-        self.with(|state| {
-            if state.streaming && acknowledge.epoch == state.epoch {
-                // limited to what was produced: a faulty host must not let the front end run
-                // further ahead
-                state.acknowledged = state.acknowledged.max(acknowledge.next_scan.min(state.next_scan));
-            }
-        });
+        self.with(|state| state.acknowledge(&acknowledge));
         self.may_run.signal(());
     }
 
     fn hear_request(&self, payload: &[u8], stage: &mut impl Stage) {
-        if self.with(|state| state.session.is_none()) {
+        if self.with(|state| state.session().is_none()) {
             // before the handshake, requests are ignored
             return;
         }
@@ -132,13 +113,13 @@ impl<M: RawMutex> Core<'_, M> {
                 return;
             }
         };
-        let answer = match self.with(|state| state.memory.look_up(request.number)) {
+        let answer = match self.with(|state| state.recall(request.number)) {
             Seen::Before(answer) => answer,
             Seen::Stale => Numbered { number: request.number, outcome: Err(Refusal::Stale) },
             Seen::New => {
                 let answer =
                     Numbered { number: request.number, outcome: self.carry_out(&request.request, stage) };
-                self.with(|state| state.memory.keep(&answer));
+                self.with(|state| state.remember(&answer));
                 answer
             }
         };
@@ -146,8 +127,7 @@ impl<M: RawMutex> Core<'_, M> {
     }
 
     fn answer(&self, answer: Numbered) {
-        // a full queue drops the reply: the host asks again, and the reply is stored
-        self.with(|state| drop(state.answers.push_back(answer)));
+        self.with(|state| state.queue_answer(answer));
         self.to_send.signal(());
     }
 }

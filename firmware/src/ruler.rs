@@ -1,4 +1,5 @@
-//! Converts timer counts of a board to instants in scans, and checks an external clock.
+//! Time on a board: converts timer counts to instants in scans, checks an external clock, and holds
+//! the state of scan clock, sync input and sync output.
 //!
 //! A board has a timer whose period is a scan, a counter of those periods, and a third,
 //! free-running timer whose inputs capture its count at an edge. An edge is thus known in counts of
@@ -6,7 +7,7 @@
 //! With an external clock, a period deviates from its nominal count; over a block of scans this is
 //! an error of less than 0.003 of a scan.
 
-use jointrig_protocol::sync::CLOCK_TOLERANCE_PPM;
+use jointrig_protocol::sync::{CLOCK_TOLERANCE_PPM, Clock, ClockFault, Line, Sync};
 
 /// An instant, relative to the next scan that will be delivered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -102,6 +103,103 @@ impl ClockWatch {
 }
 
 const _: () = assert!(1_000_000 % CLOCK_TOLERANCE_PPM == 0);
+
+/// State of scan clock, sync input and sync output, and pending actions.
+#[derive(Default)]
+pub(crate) struct InStep {
+    /// Clock and counters, as reported to the host.
+    now: Sync,
+    /// Quality of the external clock so far.
+    watch: ClockWatch,
+    /// The board must select this clock.
+    order: Option<Clock>,
+    /// The sync output must pulse for this.
+    due: Option<Line>,
+}
+
+impl InStep {
+    /// Clock and counters, as reported to the host.
+    pub fn now(&self) -> Sync {
+        self.now
+    }
+
+    /// Whether the board has a pending action.
+    #[inline]
+    pub fn is_due(&self) -> bool {
+        self.order.is_some() | self.due.is_some()
+    }
+
+    /// Takes the pending actions: the clock to be selected, and the reason for a pulse.
+    pub fn take_due(&mut self) -> (Option<Clock>, Option<Line>) {
+        (self.order.take(), self.due.take())
+    }
+
+    /// Requests a pulse of the sync output with the next block.
+    pub fn mark(&mut self, line: Line) {
+        self.due = Some(line);
+    }
+
+    /// Counts a pulse of the sync output; returns its number.
+    pub fn count_pulse(&mut self) -> u32 {
+        self.now.pulses += 1;
+        self.now.pulses
+    }
+
+    /// Counts edges at the sync input, of which `lost` have no instant and one more does if
+    /// `timed`; returns the number of the latter.
+    pub fn count_edges(&mut self, lost: u32, timed: bool) -> u32 {
+        self.now.edges += lost + u32::from(timed);
+        self.now.edges_lost += lost;
+        self.now.edges
+    }
+
+    /// Selects a clock; an external one is unproven at first.
+    pub fn select(&mut self, clock: Clock) {
+        let fault = (clock != Clock::Internal).then_some(ClockFault::Unproven);
+        self.now = Sync { clock, fault, ppm: 0.0, ..self.now };
+        (self.watch, self.order) = (ClockWatch::default(), Some(clock));
+    }
+
+    /// Whether an external clock is being measured, for which scans must be taken without a stream.
+    pub fn is_measured(&self) -> bool {
+        self.now.fault == Some(ClockFault::Unproven)
+    }
+
+    /// Selects the board's own clock at the end of a session.
+    pub fn forget(&mut self) {
+        if self.now.clock != Clock::Internal || self.now.fault.is_some() {
+            self.select(Clock::Internal);
+        }
+    }
+
+    /// Returns to the board's own clock because the selected one failed; the fault is kept until
+    /// the host selects a clock.
+    pub fn fail(&mut self, fault: ClockFault) {
+        let asked = self.now.clock;
+        self.select(Clock::Internal);
+        self.now = Sync { clock: asked, fault: Some(fault), ..self.now };
+    }
+
+    /// Evaluates a span of the external clock.
+    ///
+    /// # Errors
+    /// The fault that the span reveals.
+    pub fn check(&mut self, span: Span, period: u32) -> Result<(), ClockFault> {
+        // a span of the previous clock, or of one that is no longer used
+        if self.order.is_some() || self.now.clock == Clock::Internal {
+            return Ok(());
+        }
+        let proven = self.watch.trusts();
+        if !self.watch.is_good(span, period) {
+            return Err(if proven { ClockFault::Lost } else { ClockFault::Rate });
+        }
+        if self.watch.trusts() {
+            self.now.fault = None;
+            self.now.ppm = self.watch.ppm(period);
+        }
+        Ok(())
+    }
+}
 
 #[cfg(test)]
 mod tests {

@@ -10,7 +10,7 @@ use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::limits::{MAX_CHANNELS, SCALE_FACTOR_CAP};
 
-use crate::refusal::out_of_bounds;
+use crate::sentence::out_of_bounds;
 
 /// SI units per code of every channel, sign included.
 pub(crate) type UnitsPerCode = Vec<f32, MAX_CHANNELS>;

@@ -4,6 +4,7 @@
 use core::fmt;
 
 use heapless::String;
+use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::limits::SENTENCE_BYTES;
 
 /// A message with the maximum length of an event's text; text that does not fit is dropped.
@@ -20,6 +21,14 @@ impl Tell for str {
     fn tell(&self, to: &mut Sentence) {
         to.text(self);
     }
+}
+
+/// A refusal because the request is out of bounds or refers to something that does not exist.
+pub(crate) fn out_of_bounds(sentence: &str) -> Refusal {
+    let mut text = String::new();
+    // text beyond 120 bytes is dropped
+    let _ = text.push_str(sentence);
+    Refusal::OutOfBounds(text)
 }
 
 impl Sentence {

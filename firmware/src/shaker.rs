@@ -21,8 +21,7 @@ use jointrig_protocol::request::{Control, Shake};
 use crate::hammer::Scanned;
 use crate::scales::{UnitsPerCode, as_built};
 use crate::scan_time::scans_in_ms;
-use crate::servo::{Gauges, Servo, Trouble};
-use crate::sine::sine;
+use crate::servo::{Gauges, Servo, Trouble, sine};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
@@ -121,7 +120,7 @@ impl<'a> Shaker<'a> {
         if self.full_scale_v <= 0.0 {
             return Err(Refusal::Unsupported);
         }
-        let refuse = |sentence| Err(crate::refusal::out_of_bounds(sentence));
+        let refuse = |sentence| Err(crate::sentence::out_of_bounds(sentence));
         if order.step == 0 || order.step > u32::MAX / SHAKE_SCANS_PER_CYCLE {
             return refuse("the shaker's frequency must be above 0 and at most a tenth of the scan rate");
         }

@@ -6,25 +6,28 @@ use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::Instant;
 use heapless::{Deque, String};
-use jointrig_protocol::answer::{self, Counters, Info, Refusal, Reset};
-use jointrig_protocol::channel::{Channel, Name, Role};
-use jointrig_protocol::event::{self, Event, Reason};
-use jointrig_protocol::limits;
+use jointrig_protocol::acknowledge::Acknowledge;
+use jointrig_protocol::answer::{self, Answer, Counters, Info, Refusal, Reset, Status};
+use jointrig_protocol::block::RESENT;
+use jointrig_protocol::channel::{Channel, Name};
+use jointrig_protocol::event::{self, Event, Loss, Reason};
+use jointrig_protocol::hello::Hello;
+use jointrig_protocol::limits::{self, BLOCK_SAMPLE_BYTES};
 use jointrig_protocol::shot::Phase;
-use jointrig_protocol::slow::Slow;
 use jointrig_protocol::sync::Line;
+use nalgebra::Matrix3;
 
-use crate::events::Events;
-use crate::fmt::{info, warning};
+use crate::fmt::warning;
 use crate::friction::Friction;
-use crate::hammer::{CoilOrder, Hammer, Outcome};
-use crate::in_step::InStep;
+use crate::hammer::{Outcome, Scanned};
 use crate::logs::Tap;
-use crate::memory::Memory;
-use crate::ring::{Range, Ring, Slot};
-use crate::shaker::Shaker;
+use crate::memory::{Memory, Seen};
+use crate::ring::{CHANNEL_MAP, Out, Range, Ring, Slot};
+use crate::ruler::InStep;
+use crate::safety::Safety;
+use crate::scales::{UnitsPerCode, as_built, as_told};
+use crate::sentence::{Sentence, Tell, out_of_bounds};
 
 /// Capacity for replies waiting for the link.
 const ANSWERS: usize = 8;
@@ -72,46 +75,34 @@ pub struct Core<'a, M: RawMutex> {
     pub(crate) may_run: Signal<M, ()>,
 }
 
-#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own, true or not")]
+/// What the tasks share. The fields are private: a task asks for what it needs by name.
 pub(crate) struct State<'a> {
-    pub ring: Ring<'a>,
-    pub hammer: Hammer,
-    pub shaker: Shaker<'a>,
-    pub friction: Option<Friction>,
-    pub friction_n: f32,
-    pub memory: Memory,
-    /// The session agreed on, if any.
-    pub session: Option<u32>,
-    pub hello_due: Option<u32>,
-    /// The host reads packets, so packets are sent.
-    pub packets: bool,
-    pub answers: Deque<answer::Numbered, ANSWERS>,
-    pub events: Events,
-    pub resends: Deque<Range, RESENDS>,
-    pub counters: Counters,
-    pub streaming: bool,
-    pub epoch: u32,
-    /// Streams begun since the device started.
-    pub streams: u32,
-    pub next_scan: u64,
-    pub acknowledged: u64,
-    pub last_heard: Instant,
-    /// Time of the last delivery of the front end.
-    pub last_block: Instant,
-    pub interlock_closed: bool,
-    pub emergency_stop: bool,
-    /// An order for the coil from outside the acquisition task.
-    pub coil: Option<CoilOrder>,
-    /// The drive must go to rest immediately.
-    pub drive_off: bool,
-    /// Last measured temperature and sensor supplies.
-    pub slow: Slow,
-    /// Index of the excitation force channel.
-    pub excitation: Option<usize>,
-    /// The session has sent its own scales.
-    pub scales_told: bool,
+    /// Everything that moves, and everything that forbids motion.
+    safety: Safety<'a>,
     /// Scan clock, sync input and output.
-    pub in_step: InStep,
+    in_step: InStep,
+    friction: Option<Friction>,
+    /// Mean of T over the last block, N; while streaming, computed on request.
+    friction_n: f32,
+    /// The session has sent its own scales.
+    scales_told: bool,
+    /// Blocks of the stream.
+    ring: Ring<'a>,
+    epoch: u32,
+    /// Streams begun since the device started.
+    streams: u32,
+    /// The scan up to which the host has everything.
+    acknowledged: u64,
+    resends: Deque<Range, RESENDS>,
+    counters: Counters,
+    /// The session agreed on, if any.
+    session: Option<u32>,
+    /// The session whose greeting must be answered.
+    hello_due: Option<u32>,
+    /// The host reads packets, so packets are sent.
+    packets: bool,
+    memory: Memory,
+    answers: Deque<answer::Numbered, ANSWERS>,
 }
 
 impl<'a, M: RawMutex> Core<'a, M> {
@@ -125,38 +116,23 @@ impl<'a, M: RawMutex> Core<'a, M> {
     pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
         assert!(limits::scans_per_block(facts.channels.len()).is_some(), "a scan has 1 to 16 channels");
         assert!(!slots.is_empty(), "the ring needs memory");
-        let hammer = Hammer::new(facts.channels, facts.scan_rate_hz, facts.coil_cap_us);
         let state = State {
-            ring: Ring::new(slots, 2 * facts.channels.len()),
-            hammer,
-            shaker: Shaker::new(facts.channels, facts.scan_rate_hz, facts.drive_v),
+            safety: Safety::new(facts.channels, facts.scan_rate_hz, facts.coil_cap_us, facts.drive_v),
+            in_step: InStep::default(),
             friction: Friction::new(facts.channels),
             friction_n: 0.0,
-            memory: Memory::new(),
+            scales_told: false,
+            ring: Ring::new(slots, 2 * facts.channels.len()),
+            epoch: facts.boot,
+            streams: 0,
+            acknowledged: 0,
+            resends: Deque::new(),
+            counters: Counters::default(),
             session: None,
             hello_due: None,
             packets: false,
+            memory: Memory::new(),
             answers: Deque::new(),
-            events: Events::new(),
-            resends: Deque::new(),
-            counters: Counters::default(),
-            streaming: false,
-            epoch: facts.boot,
-            streams: 0,
-            next_scan: 0,
-            acknowledged: 0,
-            last_heard: Instant::from_ticks(0),
-            last_block: Instant::from_ticks(0),
-            // closed and released until the board reports otherwise, at the latest with the first
-            // block
-            interlock_closed: true,
-            emergency_stop: false,
-            coil: None,
-            drive_off: false,
-            slow: Slow::default(),
-            excitation: facts.channels.iter().position(|channel| channel.role == Role::Excitation),
-            scales_told: false,
-            in_step: InStep::default(),
         };
         Self {
             facts,
@@ -186,17 +162,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
     /// same order, so that it is carried out even if one of the two is stuck.
     #[must_use]
     pub fn see_inputs(&self, interlock_closed: bool, emergency_stop: bool) -> bool {
-        let danger = !interlock_closed || emergency_stop;
-        self.with(|state| {
-            state.heed(interlock_closed, emergency_stop);
-            if danger {
-                // independently of the state machine's state
-                state.coil = Some(CoilOrder::Off);
-            }
-            // also when the stop is already latched: the code that muted the drive waits for this
-            // order
-            state.drive_off |= emergency_stop;
-        });
+        let danger = self.with(|state| state.safety.see_inputs(interlock_closed, emergency_stop));
         self.to_send.signal(());
         danger
     }
@@ -227,137 +193,376 @@ impl<'a, M: RawMutex> Core<'a, M> {
     }
 }
 
-impl State<'_> {
-    /// Queues an event and counts those that a full queue drops.
-    pub fn say(&mut self, event: Event) {
-        self.counters.events_dropped += self.events.push(self.next_scan, event);
+/// Reports of a board: faults of its parts, and how its last run ended.
+impl<M: RawMutex> Core<'_, M> {
+    /// Reports a fault of a part of the board. Without a host, the event waits for one.
+    pub fn report_fault(&self, what: &(impl Tell + ?Sized)) {
+        let text = Sentence::of(what);
+        warning!("fault: {}", text.as_str());
+        self.with(|state| state.safety.say(Event::Fault(text.into_string())));
+        self.to_send.signal(());
     }
 
-    /// Reports the result of a step of the hammer, and stores its order for the coil.
+    /// Reports that the previous run ended in a panic with this message.
+    pub fn report_panic(&self, what: &(impl Tell + ?Sized)) {
+        let text = Sentence::of(what);
+        warning!("the last run ended in a panic: {}", text.as_str());
+        self.with(|state| state.safety.say(Event::Panic(text.into_string())));
+        self.to_send.signal(());
+    }
+}
+
+impl<'a> State<'a> {
+    /// Everything that moves.
     #[inline]
-    pub fn tell(&mut self, outcome: &Outcome) {
-        if outcome.coil.is_some() {
-            self.coil = outcome.coil;
-        }
-        if outcome.shot.is_some() || outcome.disarmed.is_some() {
-            self.tell_of_hammer(outcome);
-        }
+    pub fn safety(&mut self) -> &mut Safety<'a> {
+        &mut self.safety
     }
 
-    #[inline(never)]
-    fn tell_of_hammer(&mut self, outcome: &Outcome) {
-        if let Some(shot) = outcome.shot {
-            info!("shot {} is {:?}", shot.number, shot.phase);
-            match shot.phase {
-                Phase::Firing => self.mark(Line::Fired),
-                Phase::Listening => self.mark(Line::Trigger),
-                _ => {}
-            }
-            self.say(Event::Shot(shot));
-        }
-        if let Some(reason) = outcome.disarmed {
-            info!("hammer disarmed: {:?}", reason);
-            self.say(Event::Disarmed(reason));
-        }
+    /// Scan clock, sync input and output.
+    #[inline]
+    pub fn in_step(&mut self) -> &mut InStep {
+        &mut self.in_step
+    }
+}
+
+/// The session.
+impl State<'_> {
+    /// Notes a valid frame of the host.
+    pub fn hear_frame(&mut self) {
+        self.counters.frames_in += 1;
+        self.safety.host_was_heard();
     }
 
-    /// Disarms the hammer.
-    pub fn disarm(&mut self, reason: Reason) {
-        let outcome = self.hammer.disarm(reason);
-        self.tell(&outcome);
+    /// Counts a frame that is damaged, or that no host sends.
+    pub fn count_bad_frame(&mut self) {
+        self.counters.frames_bad += 1;
     }
 
-    /// Brings everything that moves to rest: the hammer is disarmed, the shaker ramps down.
-    pub fn bring_to_rest(&mut self, reason: Reason) {
-        self.disarm(reason);
-        let stops = self.shaker.stop(reason);
-        self.tell_of_shaker(stops);
+    /// The session agreed on, if any.
+    pub fn session(&self) -> Option<u32> {
+        self.session
     }
 
-    /// Queues events of the shaker.
-    pub fn tell_of_shaker(&mut self, events: impl IntoIterator<Item = Event>) {
-        for event in events {
-            self.say(event);
-        }
+    /// Notes that the greeting of this session must be answered.
+    pub fn owe_hello(&mut self, session: u32) {
+        self.hello_due = Some(session);
     }
 
-    /// Whether the hammer may be armed or fired.
-    pub fn may_strike(&self) -> Result<(), Refusal> {
-        self.may_move()?;
-        if self.shaker.moves() { Err(Refusal::ShakerRuns) } else { self.is_fed(self.hammer.force_channel()) }
+    /// Begins a session, or none when its host was refused: discards the requests of the session
+    /// before, and stops its actions.
+    pub fn begin_session(&mut self, session: Option<u32>, packets: bool, channels: &[Channel]) {
+        self.packets = packets;
+        self.safety.end_stream(Reason::StreamEnded);
+        self.answers.clear();
+        self.resends.clear();
+        // only after hammer and shaker have reported how they came to rest
+        self.safety.forget_events();
+        self.ring.forget_losses();
+        self.memory = Memory::new();
+        self.forget_scales(channels);
+        self.in_step.forget();
+        self.session = session;
     }
 
-    /// Whether the shaker may run.
-    pub fn may_shake(&self) -> Result<(), Refusal> {
-        self.may_move()?;
-        match self.hammer.state() {
-            answer::Hammer::Disarmed | answer::Hammer::HoldOff => self.is_fed(self.excitation),
-            _ => Err(Refusal::HammerArmed),
-        }
+    /// Whether a request was carried out before.
+    pub fn recall(&self, number: u32) -> Seen {
+        self.memory.look_up(number)
     }
 
-    /// Whether any motion is allowed: the common check before arming, before a shot and before the
-    /// shaker.
-    pub fn may_move(&self) -> Result<(), Refusal> {
-        if !self.streaming {
-            return Err(Refusal::NotStreaming);
-        }
-        if self.emergency_stop {
-            return Err(Refusal::EmergencyStop);
-        }
-        if !self.interlock_closed {
-            return Err(Refusal::Interlock);
-        }
+    /// Stores the reply to a request that was carried out.
+    pub fn remember(&mut self, answer: &answer::Numbered) {
+        self.memory.keep(answer);
+    }
+
+    /// Queues a reply. A full queue drops it: the host asks again, and the reply is stored.
+    pub fn queue_answer(&mut self, answer: answer::Numbered) {
+        drop(self.answers.push_back(answer));
+    }
+}
+
+/// The scales used for hammer, shaker and load cells: those of the board, or those sent in the
+/// session.
+impl State<'_> {
+    /// Uses these scales from now on.
+    ///
+    /// # Errors
+    /// [`Refusal::OutOfBounds`]; [`Refusal::HammerArmed`] or [`Refusal::ShakerRuns`] while
+    /// something may move based on the old scales.
+    pub fn take_scales(&mut self, channels: &[Channel], units_per_volt: &[f32]) -> Result<(), Refusal> {
+        let scales = as_told(channels, units_per_volt)?;
+        self.safety.may_be_rescaled()?;
+        self.judge_by(&scales);
+        self.scales_told = true;
         Ok(())
     }
 
-    /// Acts on the present states of guard and emergency stop. Releasing the stop has no effect
-    /// here: that requires a reset at the rig.
-    pub fn heed(&mut self, interlock_closed: bool, pressed: bool) {
-        if pressed && !self.emergency_stop {
-            self.stop_everything();
-        }
-        if interlock_closed != self.interlock_closed {
-            self.interlock_closed = interlock_closed;
-            self.say(Event::Interlock(interlock_closed));
-        }
-        if !interlock_closed {
-            self.bring_to_rest(Reason::Interlock);
+    /// Restores the built-in scales if a session has changed them.
+    fn forget_scales(&mut self, channels: &[Channel]) {
+        if core::mem::take(&mut self.scales_told) {
+            self.judge_by(&as_built(channels));
         }
     }
 
-    /// Latches the emergency stop, disarms the hammer and halts the shaker.
-    pub fn stop_everything(&mut self) {
-        if !self.emergency_stop {
-            warning!("emergency stop");
-            self.emergency_stop = true;
-            self.say(Event::EmergencyStop(true));
+    fn judge_by(&mut self, scales: &UnitsPerCode) {
+        self.safety.judge_by(scales);
+        if let Some(friction) = &mut self.friction {
+            friction.judge_by(scales);
         }
-        self.disarm(Reason::EmergencyStop);
-        let stops = self.shaker.halt(Reason::EmergencyStop);
-        self.tell_of_shaker(stops);
-        // independently of the state machines' states
-        self.coil = Some(CoilOrder::Off);
-        self.drive_off = true;
+    }
+
+    /// Sets the load cells' calibration matrix, in rows.
+    ///
+    /// # Errors
+    /// [`Refusal::Unsupported`] without three load cells.
+    pub fn calibrate(&mut self, matrix: &[f32; 9]) -> Result<(), Refusal> {
+        let friction = self.friction.as_mut().ok_or(Refusal::Unsupported)?;
+        friction.calibrate(&Matrix3::from_row_slice(matrix));
+        Ok(())
+    }
+}
+
+/// The stream.
+impl State<'_> {
+    /// Starts a new stream with a new epoch; the scan index continues.
+    ///
+    /// # Errors
+    /// [`Refusal::Clock`] while the scan clock cannot be relied on.
+    pub fn start_stream(&mut self, boot: u32) -> Result<Answer, Refusal> {
+        if let Some(fault) = self.in_step.now().fault {
+            return Err(Refusal::Clock(fault));
+        }
+        self.safety.begin_stream();
+        // each device start has 65536 epochs; after that they run into the next start's range
+        // instead of repeating
+        self.epoch = (boot << 16).wrapping_add(self.streams);
+        self.streams = self.streams.wrapping_add(1);
+        self.ring.restart(self.epoch);
+        self.resends.clear();
+        self.counters.scans_produced = 0;
+        self.counters.scans_sent = 0;
+        self.counters.scans_resent = 0;
+        self.counters.scans_dropped = 0;
+        self.counters.scans_missed = 0;
+        let first_scan = self.safety.next_scan();
+        self.acknowledged = first_scan;
+        Ok(Answer::Started { epoch: self.epoch, map: CHANNEL_MAP, first_scan })
+    }
+
+    /// Notes that the host has everything up to a scan of this epoch.
+    pub fn acknowledge(&mut self, acknowledge: &Acknowledge) {
+        if self.safety.is_streaming() && acknowledge.epoch == self.epoch {
+            // limited to what was produced: a faulty host must not let the front end run further
+            // ahead
+            let produced = acknowledge.next_scan.min(self.safety.next_scan());
+            self.acknowledged = self.acknowledged.max(produced);
+        }
+    }
+
+    /// Whether a front end that can be held may run: in a stream, no more than half a ring ahead of
+    /// the host's acknowledgement, or while a clock is being measured.
+    pub fn may_scan(&self) -> bool {
+        let ahead = self.safety.next_scan().saturating_sub(self.acknowledged);
+        let runs = self.safety.is_streaming() && ahead < u64::from(self.ring.capacity_scans() / 2);
+        runs || self.in_step.is_measured()
+    }
+
+    /// Queues scans to be sent again.
+    ///
+    /// # Errors
+    /// A [`Refusal`] when they are not in the ring, or when the queue is full.
+    pub fn resend(&mut self, epoch: u32, first_scan: u64, scans: u32) -> Result<Answer, Refusal> {
+        if epoch != self.epoch {
+            return Err(Refusal::WrongEpoch { current: self.epoch });
+        }
+        let oldest = self.ring.oldest_scan().ok_or(Refusal::NotStreaming)?;
+        let end = first_scan.saturating_add(u64::from(scans)).min(self.safety.next_scan());
+        if first_scan < oldest {
+            return Err(Refusal::Gone { oldest });
+        }
+        if first_scan >= end {
+            return Err(out_of_bounds("no such scans have been produced yet"));
+        }
+        let range = Range { first_scan, scans: end - first_scan };
+        // a full queue is refused; the host asks again
+        self.resends.push_back(range).map_err(|_| Refusal::Busy)?;
+        Ok(Answer::Resending { first_scan, scans: (end - first_scan) as u32 })
+    }
+
+    /// The counters, as reported to the host.
+    pub fn counters(&self) -> Counters {
+        Counters { events_dropped: self.safety.events_dropped(), ..self.counters }
+    }
+
+    /// Notes how many log lines were dropped.
+    pub fn note_dropped_logs(&mut self, dropped: u32) {
+        self.counters.logs_dropped = dropped;
+    }
+
+    /// The state of everything, for a device of `channels` channels.
+    pub fn status(&mut self, channels: usize) -> Status {
+        let friction_n = self.friction_of_last_block(channels);
+        let safety = &self.safety;
+        Status {
+            epoch: self.epoch,
+            streaming: safety.is_streaming(),
+            next_scan: safety.next_scan(),
+            oldest_scan: self.ring.oldest_scan().unwrap_or(safety.next_scan()),
+            hammer: safety.hammer().state(),
+            armed_for_ms: safety.hammer().armed_for_ms(safety.next_scan()),
+            interlock_closed: safety.interlock_closed(),
+            emergency_stop: safety.emergency_stop(),
+            friction_n,
+            shot: safety.hammer().shot(),
+            shaker: safety.shaker().state(),
+            drive_v: safety.shaker().amplitude_v(),
+            controlled: safety.shaker().controlled(),
+            counters: self.counters(),
+        }
     }
 
     /// Mean of T over the last block, N.
-    pub fn friction_of_last_block(&mut self, channels: usize) -> f32 {
-        if self.streaming
+    fn friction_of_last_block(&mut self, channels: usize) -> f32 {
+        if self.safety.is_streaming()
             && let (Some(friction), Some(samples)) = (&self.friction, self.ring.newest())
         {
             self.friction_n = friction.mean_of(samples.as_chunks().0, channels);
         }
         self.friction_n
     }
+}
+
+/// One block of acquisition.
+impl State<'_> {
+    /// Accounts for scans that the front end did not deliver; the scan index advances over them.
+    #[inline(never)]
+    pub fn lose_scans(&mut self, missed: u32) {
+        self.safety.scans_are_lost();
+        self.counters.scans_missed += u64::from(missed);
+        if self.safety.is_streaming() {
+            let range = Range { first_scan: self.safety.next_scan(), scans: u64::from(missed) };
+            self.ring.report(range, Loss::FrontEnd);
+        }
+        self.safety.advance(u64::from(missed));
+    }
+
+    /// Lets the hammer evaluate a block; its outcome is carried out by [`Self::follow`].
+    #[inline]
+    pub fn judge(&mut self, block: &impl Scanned) -> Option<Outcome> {
+        self.safety.judge(block, self.friction.as_ref())
+    }
+
+    /// Keeps a block of `scans` scans: in the ring while streaming, otherwise only its mean
+    /// friction. `pairs` are the codes of its `samples`.
+    #[inline]
+    pub fn keep(
+        &mut self,
+        flags: u8,
+        scans: usize,
+        samples: &[u8; BLOCK_SAMPLE_BYTES],
+        pairs: &[[u8; 2]],
+        channels: usize,
+    ) {
+        if self.safety.is_streaming() {
+            let dropped = self.ring.push(self.safety.next_scan(), flags, scans as u8, samples);
+            self.counters.scans_dropped += dropped;
+            self.counters.scans_produced += scans as u64;
+        } else if let Some(friction) = &self.friction {
+            // while streaming, the ring holds the last block and the mean is computed on request
+            self.friction_n = friction.mean_of(pairs, channels);
+        }
+    }
+
+    /// Carries out the hammer's outcome, and marks its shot at the sync output.
+    #[inline]
+    pub fn follow(&mut self, outcome: &Outcome) {
+        self.safety.follow(outcome);
+        match outcome.shot.map(|shot| shot.phase) {
+            Some(Phase::Firing) => self.in_step.mark(Line::Fired),
+            Some(Phase::Listening) => self.in_step.mark(Line::Trigger),
+            _ => {}
+        }
+    }
+
+    /// Blocks that wait for the link.
+    #[inline]
+    pub fn unsent_blocks(&self) -> u64 {
+        self.ring.unsent()
+    }
+}
+
+/// What waits for the link, the most urgent first.
+impl State<'_> {
+    /// Takes the answer to a greeting.
+    pub fn take_hello(&mut self, boot: u32) -> Option<Hello> {
+        let session = self.hello_due.take()?;
+        let device = Hello::device(session, boot, self.ring.capacity_scans());
+        Some(Hello { packets: self.packets, ..device })
+    }
+
+    /// Whether packets are sent instead of COBS.
+    pub fn sends_packets(&self) -> bool {
+        self.packets
+    }
+
+    /// Whether replies, events or the report of a loss are waiting.
+    #[inline]
+    pub fn has_words(&self) -> bool {
+        !self.answers.is_empty() || self.safety.has_events() || self.ring.has_loss()
+    }
+
+    /// Whether scans must be sent again.
+    #[inline]
+    pub fn has_resends(&self) -> bool {
+        !self.resends.is_empty()
+    }
+
+    /// Takes the oldest reply.
+    pub fn take_answer(&mut self) -> Option<answer::Numbered> {
+        self.answers.pop_front()
+    }
+
+    /// Takes the oldest loss, or else the oldest event.
+    pub fn take_event(&mut self) -> Option<event::Numbered> {
+        self.take_loss().or_else(|| self.safety.take_event())
+    }
 
     /// The event for the oldest loss of scans that has not been reported to the host.
-    pub fn take_loss(&mut self) -> Option<event::Numbered> {
+    fn take_loss(&mut self) -> Option<event::Numbered> {
         let (range, why) = self.ring.take_loss()?;
         let scans = u32::try_from(range.scans).unwrap_or(u32::MAX);
         warning!("{} scans from {} were lost", scans, range.first_scan);
         let lost = Event::Lost { epoch: self.epoch, first_scan: range.first_scan, scans, why };
-        Some(self.events.number(self.next_scan, lost))
+        Some(self.safety.number(lost))
+    }
+
+    /// The next block that must be sent again.
+    pub fn take_resent(&mut self) -> Option<Out<'_>> {
+        while let Some(range) = self.resends.front_mut() {
+            let end = range.first_scan + range.scans;
+            match self.ring.at_or_after(range.first_scan, RESENT) {
+                Some((out, after)) if out.header.first_scan < end => {
+                    self.counters.scans_resent += u64::from(out.header.scans);
+                    range.scans = end.saturating_sub(after);
+                    range.first_scan = after;
+                    if after >= end {
+                        self.resends.pop_front();
+                    }
+                    return Some(out);
+                }
+                // it left the ring meanwhile: the host asks again and is told that it is gone
+                _ => drop(self.resends.pop_front()),
+            }
+        }
+        None
+    }
+
+    /// The next new block.
+    #[inline]
+    pub fn take_unsent(&mut self) -> Option<Out<'_>> {
+        let out = self.ring.next_unsent()?;
+        self.counters.scans_sent += u64::from(out.header.scans);
+        Some(out)
     }
 }
 

@@ -12,7 +12,8 @@ use std::vec::Vec;
 use super::*;
 use crate::board::NoStage;
 use crate::events::EVENTS;
-use jointrig_protocol::event::Loss;
+use crate::hammer::CoilOrder;
+use crate::safety::Orders;
 
 /// A device that streams and whose hammer is armed.
 fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRawMutex> {
@@ -32,8 +33,9 @@ fn armed<'a>(channels: &'a [Channel], slots: &'a mut [Slot]) -> Core<'a, NoopRaw
     };
     let core = Core::new(facts, slots);
     core.with(|state| {
-        state.streaming = true;
-        state.hammer.arm(0, 1_000).expect("a hammer at rest");
+        state.safety.begin_stream();
+        state.safety.arm(1_000).expect("a hammer at rest");
+        while state.take_event().is_some() {}
     });
     core
 }
@@ -50,8 +52,12 @@ fn channel(role: Role) -> Channel {
     }
 }
 
+fn orders(core: &Core<'_, NoopRawMutex>) -> Orders {
+    core.with(|state| state.safety.take_orders())
+}
+
 fn said(core: &Core<'_, NoopRawMutex>) -> Vec<Event> {
-    core.with(|state| core::iter::from_fn(|| state.events.pop()).map(|event| event.event).collect())
+    core.with(|state| core::iter::from_fn(|| state.safety.take_event()).map(|event| event.event).collect())
 }
 
 #[test]
@@ -65,12 +71,12 @@ fn inputs_are_heeded_and_told_without_a_block() {
 
     assert!(core.see_inputs(false, false));
     assert_eq!(said(&core), [Event::Interlock(false), Event::Disarmed(Reason::Interlock)]);
-    assert_eq!(core.with(|state| state.coil.take()), Some(CoilOrder::Off));
-    assert_eq!(core.with(|state| state.may_move()), Err(Refusal::Interlock));
+    assert_eq!(orders(&core).coil, Some(CoilOrder::Off));
+    assert_eq!(core.with(|state| state.safety.may_move()), Err(Refusal::Interlock));
     // the same inputs again: no new event, but still an order
     assert!(core.see_inputs(false, false));
     assert_eq!(said(&core), []);
-    assert_eq!(core.with(|state| state.coil.take()), Some(CoilOrder::Off));
+    assert_eq!(orders(&core).coil, Some(CoilOrder::Off));
     assert!(!core.see_inputs(true, false));
     assert_eq!(said(&core), [Event::Interlock(true)]);
 }
@@ -82,15 +88,15 @@ fn an_emergency_stop_stays_when_its_button_is_released() {
     let core = armed(&channels, &mut slots);
     assert!(core.see_inputs(true, true));
     assert_eq!(said(&core), [Event::EmergencyStop(true), Event::Disarmed(Reason::EmergencyStop)]);
-    assert!(core.with(|state| core::mem::take(&mut state.drive_off)));
+    assert!(orders(&core).drive_off);
     assert!(!core.see_inputs(true, false));
-    assert!(!core.with(|state| state.drive_off));
+    assert!(!orders(&core).drive_off);
     // pressed again while latched: no new event, but still an order
     assert!(core.see_inputs(true, true));
-    assert!(core.with(|state| state.drive_off));
+    assert!(orders(&core).drive_off);
     assert!(!core.see_inputs(true, false));
     assert_eq!(said(&core), []);
-    assert_eq!(core.with(|state| state.may_move()), Err(Refusal::EmergencyStop));
+    assert_eq!(core.with(|state| state.safety.may_move()), Err(Refusal::EmergencyStop));
 }
 
 #[test]
@@ -184,15 +190,15 @@ fn a_new_session_receives_no_shot_of_the_session_before_and_every_fault() {
     core.carry_out(&fire(37), &mut NoStage).expect("armed");
     // the link of this session sends nothing, and its host ends while the shot waits
     core.with(|state| {
-        state.say(Event::Armed);
-        state.say(Event::Counters(state.counters));
+        state.safety.say(Event::Armed);
+        state.safety.say(Event::Counters(state.counters()));
     });
     greet(&core, 2);
     let frames = transmits(&core);
     assert_eq!(frames[0].0, Kind::Hello);
     let events: Vec<Event> = events(&frames).into_iter().map(|event| event.event).collect();
     assert_eq!(events, [Event::Fault("a converter".try_into().expect("short"))]);
-    assert_eq!(core.with(|state| state.hammer.state()), answer::Hammer::Disarmed);
+    assert_eq!(core.with(|state| state.safety.hammer().state()), answer::Hammer::Disarmed);
 }
 
 #[test]
@@ -222,11 +228,11 @@ fn counters_displace_no_other_event() {
         state.session = Some(1);
         // a minute on a link that accepts nothing
         for _ in 0..60 {
-            state.say(Event::Counters(Counters::default()));
+            state.safety.say(Event::Counters(Counters::default()));
         }
         for _ in 0..3 {
-            state.ring.push(state.next_scan, 0, 15, &[0; limits::BLOCK_SAMPLE_BYTES]);
-            state.next_scan += 15;
+            state.ring.push(state.safety.next_scan(), 0, 15, &[0; limits::BLOCK_SAMPLE_BYTES]);
+            state.safety.advance(15);
         }
     });
     assert!(core.see_inputs(false, true));
@@ -251,8 +257,8 @@ fn a_loss_is_reported_however_many_events_wait() {
     }
     core.with(|state| {
         for _ in 0..4 {
-            state.ring.push(state.next_scan, 0, 15, &[0; limits::BLOCK_SAMPLE_BYTES]);
-            state.next_scan += 15;
+            state.ring.push(state.safety.next_scan(), 0, 15, &[0; limits::BLOCK_SAMPLE_BYTES]);
+            state.safety.advance(15);
         }
     });
     assert!(core.see_inputs(false, false));

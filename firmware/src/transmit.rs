@@ -6,7 +6,7 @@
 //! are reported as a range before the next block is sent.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use jointrig_protocol::block::{HEADER_PAYLOAD, RESENT};
+use jointrig_protocol::block::HEADER_PAYLOAD;
 use jointrig_protocol::frame::{Kind, Writer};
 use jointrig_protocol::hello::Hello;
 
@@ -57,15 +57,14 @@ impl<M: RawMutex> Core<'_, M> {
     /// Writes the most urgent payload; returns its length, or `None` when there is nothing to send.
     fn next_frame(&self, writer: &mut Writer) -> Option<Next> {
         self.with(|state| {
-            if let Some(session) = state.hello_due.take() {
-                let payload = state.write_hello(session, self.facts.boot, writer);
-                return Some(Next { payload, packet: false, more: true });
+            if let Some(hello) = state.take_hello(self.facts.boot) {
+                return Some(Next { payload: write_hello(&hello, writer), packet: false, more: true });
             }
-            state.session?;
+            state.session()?;
             let payload = state.next_payload(writer).or_else(|| self.log_lines(writer))?;
             // on a link that keeps up, nothing is left after the newest block
             let more = state.is_behind() || self.logs.is_some_and(Tap::waits);
-            Some(Next { payload, packet: state.packets, more })
+            Some(Next { payload, packet: state.sends_packets(), more })
         })
     }
 
@@ -79,22 +78,9 @@ impl<M: RawMutex> Core<'_, M> {
 }
 
 impl State<'_> {
-    fn write_hello(&self, session: u32, boot: u32, writer: &mut Writer) -> usize {
-        writer.restart(Kind::Hello);
-        let device = Hello::device(session, boot, self.ring.capacity_scans());
-        let bytes = Hello { packets: self.packets, ..device }.to_bytes();
-        writer.payload_mut()[..bytes.len()].copy_from_slice(&bytes);
-        bytes.len()
-    }
-
     /// Whether anything but log lines is waiting.
     fn is_behind(&self) -> bool {
-        self.ring.unsent() > 0 || self.has_words() || !self.resends.is_empty()
-    }
-
-    /// Whether replies, events or the report of a loss are waiting.
-    pub fn has_words(&self) -> bool {
-        !self.answers.is_empty() || !self.events.is_empty() || self.ring.has_loss()
+        self.unsent_blocks() > 0 || self.has_words() || self.has_resends()
     }
 
     /// Writes the most urgent payload, log lines excluded.
@@ -104,55 +90,46 @@ impl State<'_> {
         {
             return Some(length);
         }
-        if self.resends.is_empty() { self.new_block(writer) } else { self.resent_block(writer) }
+        if self.has_resends() { self.resent_block(writer) } else { self.new_block(writer) }
     }
 
     /// Writes the next reply or event.
     #[inline(never)]
     fn next_word(&mut self, writer: &mut Writer) -> Option<usize> {
-        while let Some(answer) = self.answers.pop_front() {
+        while let Some(answer) = self.take_answer() {
             writer.restart(Kind::Answer);
             if let Ok(length) = answer.write(writer.payload_mut()) {
                 return Some(length);
             }
         }
-        while let Some(event) = self.take_loss().or_else(|| self.events.pop()) {
+        while let Some(event) = self.take_event() {
             writer.restart(Kind::Event);
             if let Ok(length) = event.write(writer.payload_mut()) {
                 return Some(length);
             }
-            self.counters.events_dropped += 1;
+            self.safety().count_dropped_event();
         }
         None
     }
 
     #[inline(never)]
     fn resent_block(&mut self, writer: &mut Writer) -> Option<usize> {
-        while let Some(range) = self.resends.front_mut() {
-            let end = range.first_scan + range.scans;
-            match self.ring.at_or_after(range.first_scan, RESENT) {
-                Some((out, after)) if out.header.first_scan < end => {
-                    self.counters.scans_resent += u64::from(out.header.scans);
-                    range.scans = end.saturating_sub(after);
-                    range.first_scan = after;
-                    let length = write_block(writer, &out);
-                    if after >= end {
-                        self.resends.pop_front();
-                    }
-                    return Some(length);
-                }
-                // it left the ring meanwhile: the host asks again and is told that it is gone
-                _ => drop(self.resends.pop_front()),
-            }
+        if let Some(out) = self.take_resent() {
+            return Some(write_block(writer, &out));
         }
         self.new_block(writer)
     }
 
     fn new_block(&mut self, writer: &mut Writer) -> Option<usize> {
-        let out = self.ring.next_unsent()?;
-        self.counters.scans_sent += u64::from(out.header.scans);
-        Some(write_block(writer, &out))
+        Some(write_block(writer, &self.take_unsent()?))
     }
+}
+
+fn write_hello(hello: &Hello, writer: &mut Writer) -> usize {
+    writer.restart(Kind::Hello);
+    let bytes = hello.to_bytes();
+    writer.payload_mut()[..bytes.len()].copy_from_slice(&bytes);
+    bytes.len()
 }
 
 fn write_block(writer: &mut Writer, out: &Out<'_>) -> usize {

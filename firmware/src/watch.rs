@@ -2,13 +2,10 @@
 //! the shaker. Also counts dropped log lines and reports the counters once a second.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use embassy_time::{Duration, Instant, Timer};
-use jointrig_protocol::answer::{Hammer, Shaker};
-use jointrig_protocol::event::{Event, Reason};
-use jointrig_protocol::limits::{LINK_SILENCE_MS, SCAN_SILENCE_MS};
+use embassy_time::{Duration, Timer};
+use jointrig_protocol::event::Event;
 
 use crate::Core;
-use crate::fmt::warning;
 
 /// Interval of the checks.
 const PERIOD: Duration = Duration::from_millis(100);
@@ -22,26 +19,13 @@ pub async fn watch<M: RawMutex>(core: &Core<'_, M>) -> ! {
         Timer::after(PERIOD).await;
         periods = periods.wrapping_add(1);
         core.with(|state| {
-            let silent = Instant::now().saturating_duration_since(state.last_heard).as_millis();
-            let armed = matches!(state.hammer.state(), Hammer::Armed | Hammer::Waiting | Hammer::Firing);
-            let shakes = matches!(state.shaker.state(), Shaker::Slewing | Shaker::Steady);
-            if (armed || shakes) && silent >= u64::from(LINK_SILENCE_MS) {
-                warning!("the host is silent: everything comes to rest");
-                state.bring_to_rest(Reason::LinkLost);
-            }
-            let blind = Instant::now().saturating_duration_since(state.last_block).as_millis();
-            if (armed || shakes) && blind >= u64::from(SCAN_SILENCE_MS) {
-                warning!("no scans: everything comes to rest");
-                // the ramp needs the next block for its codes; without blocks the drive is already
-                // at rest
-                state.bring_to_rest(Reason::FrontEnd);
-            }
+            state.safety().check_silence();
             if let Some(tap) = core.logs {
-                state.counters.logs_dropped = tap.dropped();
+                state.note_dropped_logs(tap.dropped());
             }
-            if state.streaming && periods.is_multiple_of(REPORT_EVERY) {
-                let counters = state.counters;
-                state.say(Event::Counters(counters));
+            if state.safety().is_streaming() && periods.is_multiple_of(REPORT_EVERY) {
+                let counters = state.counters();
+                state.safety().say(Event::Counters(counters));
             }
         });
         core.to_send.signal(());

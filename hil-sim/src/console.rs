@@ -28,8 +28,9 @@ pub fn obey(controls: &Controls, line: &str) -> Result<String, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     match words[..] {
         ["load", newtons] => {
-            let load: f64 =
-                newtons.parse().map_err(|_| format!("`{newtons}` is no number of newtons: load 150"))?;
+            let load: f64 = newtons
+                .parse()
+                .map_err(|_| format!("`{newtons}` is not a number of newtons: write e.g. load 150"))?;
             controls.set_normal_load(load).map_err(|error| error.to_string())?;
             return Ok(format!("normal load {load} N"));
         }
@@ -38,7 +39,7 @@ pub fn obey(controls: &Controls, line: &str) -> Result<String, String> {
         ["emergency", "press"] => controls.press_emergency_stop(true),
         ["emergency", "release"] => controls.press_emergency_stop(false),
         ["reset"] => controls.reset(),
-        _ => return Err(format!("`{}` is not known here: {WORDS}", line.trim())),
+        _ => return Err(format!("`{}` is not a command: write {WORDS}", line.trim())),
     }
     Ok(words.join(" "))
 }

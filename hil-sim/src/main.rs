@@ -91,7 +91,7 @@ fn stand_at(controls: &Arc<Controls>) {
     let controls = Arc::clone(controls);
     std::thread::spawn(move || {
         if let Err(error) = console::listen(&controls, std::io::stdin().lock(), std::io::stderr()) {
-            eprintln!("stdin is not listened to any more: {error}");
+            eprintln!("stdin is no longer read: {error}");
         }
     });
 }
@@ -121,7 +121,7 @@ fn serve_image(
 
 #[cfg(not(unix))]
 fn serve_image(_: &Path, _: &str, _: Option<&str>, _: u64) -> Result<(), Box<dyn std::error::Error>> {
-    Err("the emulated board needs shared memory as Unix systems have it".into())
+    Err("the emulated board needs shared memory, which only Unix systems have".into())
 }
 
 #[cfg(unix)]

@@ -185,14 +185,14 @@ pub fn tcp(board: &mut HostEnd, listener: &TcpListener) -> io::Result<()> {
                 Ok(came) => match sender.try_send(came) {
                     Err(TrySendError::Disconnected(_)) => return,
                     Err(TrySendError::Full((_, peer))) => {
-                        tell(&format!("{peer} was turned away: {QUEUE} wait"));
+                        tell(&format!("{peer} was rejected: {QUEUE} connections are waiting"));
                     }
                     Ok(()) => {}
                 },
                 // the peer disconnected before it was accepted, or the process has no free file
                 // descriptor at present
                 Err(error) => {
-                    tell(&format!("a peer could not be let in: {error}"));
+                    tell(&format!("a connection could not be accepted: {error}"));
                     std::thread::sleep(POLL);
                 }
             }
@@ -202,9 +202,9 @@ pub fn tcp(board: &mut HostEnd, listener: &TcpListener) -> io::Result<()> {
     loop {
         let came = next.take().or_else(|| peers.recv().ok());
         let Some((stream, peer)) = came else {
-            return Err(io::Error::new(ErrorKind::NotConnected, "nobody listens for peers any more"));
+            return Err(io::Error::new(ErrorKind::NotConnected, "no more connections are accepted"));
         };
-        tell(&format!("{peer} has come"));
+        tell(&format!("{peer} connected"));
         let mut others_wait = || {
             next = next.take().or_else(|| peers.try_recv().ok());
             next.is_some()
@@ -212,8 +212,8 @@ pub fn tcp(board: &mut HostEnd, listener: &TcpListener) -> io::Result<()> {
         let why = match halves(stream) {
             Ok((reader, writer)) => match bridge(board, reader, writer, Some(&mut others_wait))? {
                 End::Went => "has gone",
-                End::Stranger => "was let go: it did not shake hands",
-                End::Silent => "was let go: it was silent, and another one waits",
+                End::Stranger => "was disconnected: it did not complete the handshake",
+                End::Silent => "was disconnected: it was silent, and another connection is waiting",
             },
             Err(_) => "has gone",
         };

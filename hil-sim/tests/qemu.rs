@@ -14,7 +14,7 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::ad7606b::reader::Trouble;
 use jointrig_hil_sim::board::qemu::{ConverterFault, Faults, QemuBoard, QemuError, Slip};
 use jointrig_hil_sim::board::{Options, VirtualBoard};
 use jointrig_hil_sim::rig::RigConfig;

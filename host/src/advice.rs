@@ -13,9 +13,9 @@ pub(crate) fn reading(error: &Error) -> &'static str {
         ErrorKind::InvalidData | ErrorKind::UnexpectedEof => {
             "it is damaged, cut off or of another kind: copy or export it again"
         }
-        ErrorKind::Unsupported => "copy what it gives into a file, and name that",
+        ErrorKind::Unsupported => "copy its content into a file, and name that file",
         ErrorKind::FileTooLarge => "check that it is the right file; if it is, split it",
-        _ => "is the disk whole and connected?",
+        _ => "is the disk healthy and connected?",
     }
 }
 
@@ -32,7 +32,7 @@ pub(crate) fn writing(error: &Error) -> &'static str {
         ErrorKind::AlreadyExists | ErrorKind::NotADirectory | ErrorKind::IsADirectory => {
             "something else has this name: choose another"
         }
-        _ => "is the disk whole and connected?",
+        _ => "is the disk healthy and connected?",
     }
 }
 

@@ -55,7 +55,7 @@ fn refuse_what_is_no_file(there: &std::fs::Metadata) -> io::Result<()> {
     if !there.is_file() {
         return Err(io::Error::new(
             ErrorKind::Unsupported,
-            "it is a pipe, a socket or a device, and no file",
+            "it is a pipe, a socket or a device, and not a file",
         ));
     }
     Ok(())
@@ -88,7 +88,7 @@ pub(crate) fn text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(bytes(path, most)?).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + memchr::memchr_iter(b'\n', good).count();
-        io::Error::new(ErrorKind::InvalidData, format!("line {line} is no text (UTF-8)"))
+        io::Error::new(ErrorKind::InvalidData, format!("line {line} is not text (UTF-8)"))
     })
 }
 

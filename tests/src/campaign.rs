@@ -5,15 +5,15 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use jointrig::campaign::run::runner::RunError;
+use jointrig::campaign::run::error::RunError;
 use jointrig::campaign::run::runner::{self, Options, Summary};
 use jointrig::campaign::run::stage::Stage;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::campaign::verdict::judge::ByRecord;
 use jointrig::campaign::watch::Watchers;
-use jointrig::device::address::Transport;
 use jointrig::device::session::Session;
+use jointrig::device::transport::Transport;
 
 /// A plan of few cells: geometry and limits of the demo plan, with other cells and hits.
 #[must_use]

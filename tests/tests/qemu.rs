@@ -13,10 +13,10 @@ use std::time::{Duration, Instant};
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::address::Address;
-use jointrig::device::address::Transport;
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::logs::Tables;
 use jointrig::device::session::Session;
+use jointrig::device::transport::Transport;
 use jointrig_tests::campaign::{origins, rows, run, small_plan};
 use jointrig_tests::command::Served;
 

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::frames::CrcMismatch;
-use super::range::Range;
+use super::part::Range;
 use crate::sentence::{Sentence, Tell};
 
 /// Why the converter cannot be used. `S` is the serial port's error, `P` the pins'.

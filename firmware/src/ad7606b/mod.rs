@@ -14,28 +14,20 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | [`part`] | differences between the parts |
-//! | [`range`] | input ranges, conversion between codes and volts |
-//! | [`registers`] | addresses and bits |
+//! | [`part`] | differences between the parts; input ranges, conversion between codes and volts |
 //! | [`frames`] | data on the DOUT lines, and its CRC |
-//! | [`converter`] | one chip: reset, identity, settings, diagnostics, single conversions |
-//! | [`alignment`] | two chips: whether their data are aligned with their clock |
-//! | [`reader`] | two chips: sixteen channels per scan, and accounting of missing scans |
+//! | [`converter`] | one chip: registers, reset, settings, diagnostics, single conversions |
+//! | [`reader`] | two chips: alignment with their clock, sixteen channels per scan, faults |
 
-pub mod alignment;
 pub mod converter;
 pub mod error;
 pub mod frames;
 pub mod part;
-pub mod range;
 pub mod reader;
-pub mod registers;
-pub mod trouble;
 
-pub use converter::{Converter, Settings};
+pub use converter::{Converter, Settings, registers};
 pub use error::Error;
-pub use part::{Oversampling, Part};
-pub use range::Range;
+pub use part::{Oversampling, Part, Range};
 
 /// Channels of one chip.
 pub const CHANNELS: usize = 8;

@@ -147,7 +147,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
             poller.poll();
         }
         if sampling.get() || options.free_running {
-            assert!(jump(), "the simulated board waits for something that cannot come: no alarm is set");
+            assert!(jump(), "the simulated board waits forever: no alarm is set");
             // Polled whatever the flag is: embassy sets it for the first of several tasks only, and
             // the thread that woke that task may not have set it yet.
             poller.poll();

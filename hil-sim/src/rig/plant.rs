@@ -1,22 +1,21 @@
 //! One configuration, prepared for stepping: its matrices, its modes, and its channels' output
 //! rows.
-//!
-//! True state of the joint along z, which only the simulator knows.
-//!
-//! A direction at a point of a body, for measurement or excitation.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
 
 use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
-use super::config::{BodyName, Contact, ContactLaw, ImpactPoint, ResponsePoint, RigConfig, Spot};
+use super::config::{BodyName, Contact, ContactLaw, RigConfig};
 use super::fixed::FixedRows;
 use super::flaws::Flaws;
 use super::modal::{ModalError, Mode, modes};
+use super::probe::{AXES, Probe};
 use super::sliders::Sliders;
 use super::state_space::StateSpace;
 use super::stepper::{Aimed, ExponentialStepper, Joint, ModalStepper, Slipping, Stepper};
-use super::structure::{Structure, normalized};
-use super::{Aim, Configuration, RigError};
-use nalgebra::{DMatrix, DVector};
-use std::sync::Arc;
+use super::structure::Structure;
+use super::{Aim, Configuration, JointState, RigError};
 
 /// How the structure is advanced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -135,7 +134,7 @@ impl Plant {
         let slipping = Slipping::new(sliders, joint, &stepper).ok_or_else(|| RigError::Field {
             field: "contact.slip_step_s".to_owned(),
             reason: format!(
-                "is too long for so stiff a contact on so light bodies: try {:.0e}",
+                "is too long for this contact stiffness and these masses: try {:.0e}",
                 joint.step_s / 4.0
             ),
             line: None,
@@ -221,94 +220,5 @@ impl Plant {
             Way::Modal(_) => None,
             Way::Exponential { reason, .. } => *reason,
         }
-    }
-}
-
-/// Current state of the joint. Forces and displacements are along z; the totals count from the last
-/// staging.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JointState {
-    /// Displacement of specimen A minus that of B at the contact's centre (m).
-    pub relative_m: f64,
-    /// The force that A exerts on B (N): friction and the stuck contact's dashpot.
-    pub force_n: f64,
-    /// The largest force that the contact can carry, μN (N); infinite for the linear law.
-    pub limit_n: f64,
-    /// Fraction of the contact's elements that slip, 0…1: 1 is gross slip.
-    pub sliding: f64,
-    /// Mean of the distances that the elements have slid (m).
-    pub slid_m: f64,
-    /// Energy dissipated by friction (J); over a cycle of a steady loop, the loop's area without
-    /// the part of the stuck elements' dashpots.
-    pub friction_j: f64,
-}
-
-/// Unit vectors of the axes.
-pub const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-/// One scalar output (motion along `direction`) or input (force along it).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Probe {
-    /// The body it sits on.
-    pub body: BodyName,
-    /// Position (m).
-    pub position_m: [f64; 3],
-    /// Unit vector.
-    pub direction: [f64; 3],
-}
-
-impl Probe {
-    /// Probe of a single-point vibrometer that measures along `direction`.
-    pub fn at(spot: &Spot, direction: [f64; 3]) -> Self {
-        Self { body: spot.body, position_m: spot.position_m, direction }
-    }
-
-    /// The same for a contact that slides along z.
-    pub fn along_z(spot: &Spot) -> Self {
-        Self::at(spot, AXES[2])
-    }
-}
-
-impl ResponsePoint {
-    /// x, y and z at the nominal position.
-    pub fn probes(&self) -> [Probe; 3] {
-        AXES.map(|direction| Probe { body: self.body, position_m: self.position_m, direction })
-    }
-}
-
-impl ImpactPoint {
-    /// Along the impact's direction at the nominal position.
-    pub fn probe(&self) -> Probe {
-        Probe { body: self.body, position_m: self.position_m, direction: normalized(self.direction) }
-    }
-}
-
-impl RigConfig {
-    /// The response point `name`, if `configuration` has it.
-    ///
-    /// # Errors
-    /// [`RigError::UnknownPoint`] listing the valid names.
-    pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
-        let there = || self.responses.iter().filter(|point| self.has(configuration, point.body));
-        there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
-            kind: "response",
-            name: name.to_owned(),
-            configuration,
-            valid: there().map(|point| point.name.clone()).collect(),
-        })
-    }
-
-    /// The impact point `name`, if `configuration` has it.
-    ///
-    /// # Errors
-    /// [`RigError::UnknownPoint`] listing the valid names.
-    pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
-        let there = || self.impacts.iter().filter(|point| self.has(configuration, point.body));
-        there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
-            kind: "impact",
-            name: name.to_owned(),
-            configuration,
-            valid: there().map(|point| point.name.clone()).collect(),
-        })
     }
 }

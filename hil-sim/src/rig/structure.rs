@@ -7,18 +7,13 @@
 //! and AJB. With a compliant clamp B, specimen B is a separate body: six more in B and AJB. Arm B's
 //! values include its specimen, so that a very stiff clamp B is equivalent to a rigid one. A rig
 //! with a user-defined structure has the bodies and springs that it lists.
-//!
-//! The configuration of the rig: A, B or the assembly.
-//!
-//! Unit vectors.
 
-use super::body::BodyName;
-use super::config::{Bushing, OwnStructure, RigConfig, RigidBody};
-use super::{Probe, RigError};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
 use num_complex::Complex;
-use serde::{Deserialize, Serialize};
-use std::fmt;
+
+use super::config::{BodyName, Bushing, OwnStructure, RigConfig, RigidBody};
+use super::unit_vector::normalized;
+use super::{Configuration, Probe, Quantity, RigError};
 
 /// M, C and K of one configuration, SI, in the bodies' own coordinates (m and rad).
 #[derive(Debug, Clone)]
@@ -327,67 +322,4 @@ fn body_mass(body: &RigidBody) -> Matrix6<f64> {
     let of_box = [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| m / 12.0 * sum);
     let [ixx, iyy, izz] = body.inertia_kg_m2.unwrap_or(of_box);
     Matrix6::from_diagonal(&[m, m, m, ixx, iyy, izz].into())
-}
-
-/// A configuration of the rig.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Configuration {
-    /// Moving mass, arm A and its specimen; specimen B removed.
-    A,
-    /// Arm B with its specimen; specimen A removed.
-    B,
-    /// Both, joined by the contact.
-    #[serde(rename = "AJB")]
-    Ajb,
-}
-
-impl Configuration {
-    /// All three.
-    pub const ALL: [Self; 3] = [Self::A, Self::B, Self::Ajb];
-
-    /// `A`, `B` or `AJB`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::A => "A",
-            Self::B => "B",
-            Self::Ajb => "AJB",
-        }
-    }
-
-    /// Whether the paper's rig has `body` in this configuration.
-    pub(super) fn has(self, body: BodyName) -> bool {
-        let of_b = matches!(body, BodyName::ArmB | BodyName::SpecimenB);
-        match self {
-            Self::A => !of_b,
-            Self::B => of_b,
-            Self::Ajb => true,
-        }
-    }
-}
-
-impl fmt::Display for Configuration {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.as_str())
-    }
-}
-
-/// The kind of frequency response function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Displacement per force (m/N).
-    Receptance,
-    /// Velocity per force (m/(s N)).
-    Mobility,
-    /// Acceleration per force (m/(s² N)).
-    Accelerance,
-}
-
-/// `v` normalised to length one; `v` must not be zero.
-pub(super) fn normalized(v: [f64; 3]) -> [f64; 3] {
-    // Divided by the largest component first, so that the squares of very small or large vectors
-    // neither underflow nor overflow.
-    let largest = v.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));
-    let v = v.map(|c| c / largest);
-    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    v.map(|c| c / length)
 }

@@ -123,14 +123,14 @@ fn what_cannot_be_is_refused_with_its_field_and_line() {
         (
             "joint = [\"tip_a\", \"tip_b\"]",
             "joint = [\"tip_a\", \"nose\"]",
-            "no body of [structure]: frame, tip_a, base, tip_b",
+            "not a body of [structure]: frame, tip_a, base, tip_b",
         ),
         ("between = [\"ground\", \"frame\"]", "between = [\"frame\", \"frame\"]", "has one body twice"),
         ("between = [\"ground\", \"frame\"]", "between = [\"ground\", \"flame\"]", "names flame"),
         ("name = \"tip_b\"", "name = \"tip_a\"", "is already a body"),
         ("name = \"tip_b\"", "name = \"a name that is far too long for a body\"", "more than 24 bytes"),
         ("mass_kg = 0.012", "mass_kg = -0.012", "greater than zero"),
-        ("[contact]", "[clamp]\nrigid = true\n\n[contact]", "take one of them out"),
+        ("[contact]", "[clamp]\nrigid = true\n\n[contact]", "remove one of them"),
         (
             "axes = [[0.7071, -0.7071, 0.0]",
             "axes = [[1.0, -0.7071, 0.0]",

@@ -62,7 +62,7 @@ struct Counted<'a> {
 impl NullaryFnOnce for Counted<'_> {
     type Output = [usize; 2];
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) -> [usize; 2] {
         let (mut below, mut up_to) = (0_u64, 0_u64);
@@ -76,7 +76,7 @@ impl NullaryFnOnce for Counted<'_> {
 }
 
 /// Maps a value to an integer of the same order as [`f64::total_cmp`]; integers compare faster.
-#[expect(clippy::inline_always, reason = "called where the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[inline(always)]
 fn key(value: f64) -> i64 {
     let bits = value.to_bits().cast_signed();

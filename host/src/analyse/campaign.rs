@@ -4,12 +4,12 @@ use super::assemble::everything;
 use super::averages::{CellAverage, LINES_HZ};
 use super::cell::Measurements;
 use super::checks::between_the_arms;
-use super::chosen::{Recommended, recommended};
 use super::findings::{Findings, Settings};
-use super::findings::{Fit, NoFit, fits};
+use super::fits::{Fit, NoFit, fits};
 use super::from_frfs::Substructured;
 use super::missing::{Missing, given_up};
-use super::question::{BANDS, Progress, Wanted};
+use super::recommended::{Recommended, recommended};
+use super::wanted::{BANDS, Progress, Wanted};
 use super::{cells_stage, configuration_stage, contact_stage, data_quality};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
@@ -86,7 +86,7 @@ pub fn analyse_measurements<M: Measurements>(
         fit_of_the_main_band([a, b, ajb], geometry, &options)
     };
     // run in parallel: each uses cores that the other leaves idle
-    let (fits, own) = rayon::join(fit, || contact_stage::answer(measurements, &cells.averages));
+    let (fits, own) = rayon::join(fit, || super::contact_answer::answer(measurements, &cells.averages));
     found.fits = fits;
     let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);

@@ -1,37 +1,28 @@
 //! Evaluates all measurements at the specimens: the impacts' loops, the shaker's levels, and the
 //! contact in the frequency domain.
-//!
-//! Identifies the static arm from hits on B alone, where the force at the contact is that of the
-//! hammer.
-//!
-//! The FRFs of both specimens in the assembly, for the report.
-//!
-//! The contact stiffness: selects the cells used, and evaluates them together.
 
+use super::arm_from_hits::from_hits;
 use super::averages::CellAverage;
-use super::cell::{CellName, Measurements};
+use super::cell::Measurements;
 use super::cells_stage::Cells;
-use super::checks::{ContactChange, HiddenResonance, SeriesCompliance, at_the_specimens};
+use super::checks::contact_change::ContactChange;
+use super::checks::{HiddenResonance, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
-use super::{cells_stage, chosen, impact_loops, shaker_levels};
-use crate::contact;
-use crate::contact::{BAND, ContactCell, ContactError, Input, Joint, Known, Stiffness, read};
+use super::specimen_curves::specimen_curves;
+use super::{chosen, impact_loops, shaker_levels};
+use crate::contact::{ContactError, Joint, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
-use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_known_force, from_levels};
-use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, Role, ShakerLoop, rounded};
+use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_levels};
+use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
+use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
-use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
-use crate::substructuring::idm::{Dof, IdmSet};
-use crate::substructuring::{BandStatistic, vpt};
-use nalgebra::Vector3;
-use num_complex::Complex;
-use std::f64::consts::TAU;
+use crate::substructuring::geometry::{Geometry, Grouping};
 
 /// Number of groups of hits used to distinguish a resonance from noise.
 const GROUPS: usize = 4;
@@ -104,11 +95,11 @@ pub fn at_the_contact<M: Measurements>(
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
         missing.push(Missing::EffectiveMass);
     }
-    let slip = cells_stage::told(&cells.at_contact);
+    let slip = super::hammer_slip::told(&cells.at_contact);
     let slips = slip.found() == Some(true);
     let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
     let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
-    let at_levels = shaker_levels::of(measurements, averages, own, slips, &loops);
+    let at_levels = super::level_stiffness::of(measurements, averages, own, slips, &loops);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
@@ -127,7 +118,7 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
-        joint: shaker_levels::together(own, &at_levels),
+        joint: super::level_stiffness::together(own, &at_levels),
         levels: shaker_levels::loops(steady, arm.as_ref(), at_levels),
     };
     (found, missing)
@@ -233,197 +224,4 @@ fn example<M: Measurements>(
         impact_loops::drawn(shown, cell.fs_hz, contact, delays),
         inside.and_then(|f| impact_loops::rebuilt(shown, cell.fs_hz, contact, delays, f)),
     ))
-}
-
-/// Frequency range of the fit, Hz: above the hammer's drift, below the first mode of the arm on its
-/// cells.
-const FIT_HZ: [f64; 2] = [100.0, 600.0];
-
-/// Fits mass and parallel path to the hits on B alone; `None` without a complete set of them.
-///
-/// Cells whose lines differ from those of the first are reported in `missing`. The hits are
-/// transformed to the virtual point by the impacts' transformation, so that a hit away from the
-/// contact is weighted by its lever arm.
-pub fn from_hits(
-    averages: &[CellAverage],
-    points: &Configuration,
-    virtual_point_m: [f64; 3],
-    sigma_per_s: f64,
-    parallel_path: Option<f64>,
-    missing: &mut Vec<Missing>,
-) -> Option<Identified> {
-    let mut hit: Vec<(&Point, CrossSpectra)> = Vec::new();
-    let mut frequency_hz: &[f64] = &[];
-    for cell in averages.iter().filter(|cell| cell.name.configuration == Structure::B) {
-        let Some(contact) = &cell.contact else { continue };
-        if frequency_hz.is_empty() {
-            frequency_hz = cell.spectra.frequency_hz();
-        }
-        let added = match hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
-            Some((_, sum)) => sum.add(contact).is_ok(),
-            None if contact.lines() != frequency_hz.len() => false,
-            None => {
-                let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
-                hit.push((point, contact.clone()));
-                true
-            }
-        };
-        if !added {
-            missing.push(Missing::OtherLines(cell.name.clone()));
-        }
-    }
-    if hit.is_empty() {
-        return None;
-    }
-    let impacts: Vec<Point> = hit.iter().map(|(point, _)| (*point).clone()).collect();
-    let transformation = vpt::impacts(&impacts, Vector3::from(virtual_point_m), IdmSet::Six, None).ok()?;
-    let z = IdmSet::Six.position(Dof::Z)?;
-    let lines: Vec<(Complex<f64>, Complex<f64>)> = frequency_hz
-        .iter()
-        .enumerate()
-        .filter(|(_, f)| (FIT_HZ[0]..=FIT_HZ[1]).contains(*f))
-        .map(|(l, f)| {
-            let per_newton = |signal: usize| -> Complex<f64> {
-                hit.iter().enumerate().map(|(i, (_, sum))| sum.h1(l, signal) * transformation.t[(i, z)]).sum()
-            };
-            // the cells' sum, and B's acceleration from its velocity
-            (per_newton(2), per_newton(1) * Complex::new(sigma_per_s, TAU * f))
-        })
-        .filter(|(t, a)| t.is_finite() && a.is_finite())
-        .collect();
-    from_known_force(&lines, parallel_path)
-}
-
-/// The two specimens' receptances from one impact, their difference, and the load cells' force; hit
-/// and response are positive along +z, so `sign` is −1 for a hit towards −z.
-pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfCurve; 4] {
-    let of = |output: usize, line: usize| sign * average.h1(line, output);
-    let receptance = |output: usize| move |line: usize| of(output, line) / average.s(line);
-    [
-        curve(impact, average, (Role::SpecimenA, "x_A", Some(0)), receptance(0)),
-        curve(impact, average, (Role::SpecimenB, "x_B", Some(1)), receptance(1)),
-        curve(impact, average, (Role::Relative, "Δx", None), |line| {
-            (of(0, line) - of(1, line)) / average.s(line)
-        }),
-        curve(impact, average, (Role::Force, "T", Some(2)), |line| of(2, line)),
-    ]
-}
-
-/// One curve; its coherence is that of the measured output, if it is a measured one.
-fn curve(
-    impact: &str,
-    average: &CrossSpectra,
-    (role, output, measured): (Role, &str, Option<usize>),
-    value: impl Fn(usize) -> Complex<f64>,
-) -> FrfCurve {
-    let frequency_hz = average.frequency_hz();
-    let step_hz = if frequency_hz.len() > 1 { frequency_hz[1] - frequency_hz[0] } else { 0.0 };
-    let (magnitude_m_per_n, phase_deg) = (0..average.lines())
-        .map(value)
-        .map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5)))
-        .unzip();
-    let coherence = measured.filter(|_| average.hits() > 1).map_or_else(Vec::new, |i| {
-        (0..average.lines())
-            .map(|l| average.coherence(l, i))
-            .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
-            .collect()
-    });
-    FrfCurve {
-        configuration: Structure::Ajb.into(),
-        role,
-        output: output.into(),
-        input: impact.into(),
-        hits: average.hits(),
-        first_hz: frequency_hz.first().copied().unwrap_or(0.0),
-        step_hz,
-        magnitude_m_per_n,
-        phase_deg,
-        coherence,
-    }
-}
-
-/// Whether a cell is used for the estimate of the contact: arm B's interface from hits on B alone,
-/// and from the assembly arm B's interface and the specimens from hits along z on A or on the part
-/// behind it.
-pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
-    let specimen = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::SpecimenA);
-    if !specimen || name.configuration == Structure::A {
-        return false;
-    }
-    let points = geometry.points(name.configuration);
-    let mut own = points.channels.iter().filter(|p| p.name == name.response);
-    // the contact's signals and the vibrometers on the specimens are along z, and the estimator
-    // needs the motion along x, y and z
-    let usual = own.clone().map(|p| p.direction).eq([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    let served = usual && own.any(|p| contact::serves(p.grouping));
-    let hit = points.impacts.iter().find(|p| p.name == name.impact);
-    served
-        && hit.is_some_and(|p| match name.configuration {
-            Structure::B => p.grouping == Grouping::InterfaceB,
-            _ => {
-                matches!(p.grouping, Grouping::InterfaceA | Grouping::InternalA) && p.direction[2].abs() > 0.9
-            }
-        })
-}
-
-/// Identifies the contact from the averaged cells.
-///
-/// # Errors
-/// Why there is no result, and how to obtain one.
-pub fn answer<M: Measurements>(
-    measurements: &M,
-    averages: &[CellAverage],
-) -> Result<(Stiffness, Known), ContactError> {
-    let cells = cells(measurements, averages, |average| average.damped.as_ref());
-    if cells.is_empty() {
-        let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
-        return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
-    }
-    read(&input(measurements, cells)?)
-}
-
-/// The cells that have these spectra.
-pub fn cells<'a, M: Measurements>(
-    measurements: &'a M,
-    averages: &'a [CellAverage],
-    spectra: impl Fn(&'a CellAverage) -> Option<&'a CrossSpectra>,
-) -> Vec<ContactCell<'a>> {
-    let geometry = measurements.geometry();
-    let cell = |average: &'a CellAverage| {
-        let spectra = spectra(average)?;
-        let points = geometry.points(average.name.configuration);
-        let impact = points.impacts.iter().find(|p| p.name == average.name.impact)?;
-        let point = points.channels.iter().find(|p| p.name == average.name.response)?;
-        Some(ContactCell {
-            structure: average.name.configuration,
-            impact: &impact.name,
-            impact_m: impact.position_m,
-            direction: impact.direction,
-            impact_grouping: impact.grouping,
-            point: &point.name,
-            point_m: point.position_m,
-            point_sigma_m: measurements.point_sigma_m(&point.name),
-            point_grouping: point.grouping,
-            spectra,
-            quantity: measurements.quantity(),
-        })
-    };
-    averages.iter().filter_map(cell).collect()
-}
-
-/// Input of the contact identification.
-///
-/// # Errors
-/// The plan does not state the vibrometers' points near the contact.
-pub fn input<'a, M: Measurements>(
-    measurements: &M,
-    cells: Vec<ContactCell<'a>>,
-) -> Result<Input<'a>, ContactError> {
-    Ok(Input {
-        cells,
-        contact_m: measurements.geometry().virtual_point_b_m,
-        spots_m: measurements.spots_m().ok_or(ContactError::NoSpots)?,
-        priors: measurements.contact_priors(),
-        band_hz: BAND,
-    })
 }

@@ -2,18 +2,11 @@
 //!
 //! [`crate::report::document()`] converts them to `results.json`. The stages pass data to later
 //! stages as arguments; none reads what another stored here.
-//!
-//! Fits of K and C to all three configurations and their noise.
-//!
-//! The FRFs of one configuration of a campaign file, over any range of lines.
 
-use super::assemble::{everything, hits};
-use super::averages::{Asked, CellAverage, CellSums};
-use super::cell::{CellName, Measurements};
 use super::contact_stage::Contact;
 use super::data_quality::DataQuality;
+use super::fits::Fit;
 use super::from_frfs::Substructured;
-use super::from_store::CampaignFile;
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
@@ -22,12 +15,9 @@ use crate::results::{
 };
 use crate::spectra::Windowing;
 use crate::structure::Structure;
+use crate::substructuring::Frf;
 use crate::substructuring::averaged::{Averaged, Priors};
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness};
-use crate::substructuring::fit::{FitError, Fitted, Options, fit};
-use crate::substructuring::{Band, Frf, Geometry, IdmSet};
-use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 /// All findings of the stages that were run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -109,86 +99,4 @@ pub struct ImportedFrom {
     pub utc: String,
     /// Whether their variance came with them.
     pub with_variance: bool,
-}
-
-/// A requested fit.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
-    /// Its interface deformation modes.
-    pub idms: IdmSet,
-    /// Its result.
-    pub outcome: Result<Fitted, NoFit>,
-}
-
-/// Why there is no fit.
-#[derive(Debug, Clone, PartialEq)]
-pub enum NoFit {
-    /// FRFs that were imported into the campaign came without their variance.
-    ImportWithoutVariance,
-    /// The file of this configuration has no variance.
-    FileWithoutVariance(Structure),
-    /// The fit failed.
-    Failed(FitError),
-}
-
-/// The fit with each set of modes over each band; the FRFs are those of A, B and AJB, with their
-/// variance.
-pub fn fits(
-    [a, b, ajb]: [&Frf; 3],
-    geometry: &Geometry,
-    sets: &[IdmSet],
-    bands: &[Band],
-    options: &Options,
-) -> Vec<Fit> {
-    let of = |idms: IdmSet, band: Band| {
-        let outcome = fit(a, b, ajb, geometry, idms, band, options).map_err(NoFit::Failed);
-        Fit { idms, outcome }
-    };
-    sets.iter()
-        .flat_map(|set| bands.iter().map(move |band| (*set, *band)))
-        .map(|(set, band)| of(set, band))
-        .collect()
-}
-
-impl CampaignFile {
-    /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the
-    /// geometry, computed as in the analysis, with the number of hits in each (outputs × inputs);
-    /// and messages about cells and records that cannot be used. `None` without a kept hit.
-    pub fn measured(
-        &self,
-        structure: Structure,
-        lines_hz: [f64; 2],
-    ) -> (Option<(Frf, DMatrix<usize>)>, Vec<String>) {
-        let own: Vec<&CellName> =
-            self.cells.iter().map(|cell| &cell.name).filter(|name| name.configuration == structure).collect();
-        let one = |name: &&CellName| {
-            let complaint =
-                |what: String| format!("{structure}: cell {} × {}: {what}.", name.impact, name.response);
-            let mut sums = CellSums::new((*name).clone(), self.sigma_per_s(), Asked::default(), lines_hz);
-            let (mut some, mut unfit) = (false, None);
-            let read = self.each_hit(name, false, &mut |hit, fs_hz| {
-                some = true;
-                if unfit.is_none() {
-                    unfit = sums.add(hit, fs_hz).err();
-                }
-            });
-            let left_out = match read {
-                Ok(left_out) => left_out,
-                Err(error) => return (None, vec![complaint(error.to_string())]),
-            };
-            let mut complaints: Vec<String> = left_out.into_iter().map(complaint).collect();
-            if !some {
-                return (None, complaints);
-            }
-            let found = unfit.map_or_else(|| sums.finish(), Err);
-            complaints.extend(found.as_ref().err().map(|error| complaint(error.to_string())));
-            (found.ok(), complaints)
-        };
-        let (averages, complaints): (Vec<_>, Vec<_>) = own.par_iter().map(one).unzip();
-        let averages: Vec<CellAverage> = averages.into_iter().flatten().collect();
-        let complaints = complaints.concat();
-        let points = self.geometry().points(structure);
-        let found = everything(points, &averages, self.quantity());
-        (found.map(|frf| (frf, hits(points, &averages))), complaints)
-    }
 }

@@ -1,18 +1,16 @@
 //! Access to a campaign file as measurements: records decoded, in SI units, one cell at a time,
 //! from any thread.
 //!
-//! Information in a campaign file about itself: provenance, and how much of the plan was measured.
-//!
 //! Numbers of kept and refused hits of a configuration.
-//!
-//! Errors of the analysis of a campaign file.
 
+use super::analyse_error::AnalyseError;
 use super::campaign::analyse_measurements;
 use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, ShakerLevel};
 use super::data_quality::DataQuality;
+use super::file_source::{calibrated, temperature_c};
 use super::findings::Findings;
 use super::plan_geometry::{geometry, places};
-use super::question::{Progress, Wanted};
+use super::wanted::{Progress, Wanted};
 use crate::campaign::plan::{Plan, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
@@ -27,7 +25,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::ContactPriors;
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
-use crate::results::{self, Calibrated, Cells, Completeness, HitRow, Source, rounded};
+use crate::results::{self, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::geometry::Geometry;
@@ -134,7 +132,7 @@ impl AnalysedLength {
         if self.measured {
             return (from_lead[1] > plan_s + LEAD_S).then(|| {
                 format!(
-                    "imported records last up to {:.3} s from the hit on: they are cut to the plan's length_s of {plan_s} s, which the \
+                    "imported records last up to {:.3} s after the hit: they are cut to the plan's length_s of {plan_s} s, which the \
                      measured records have",
                     from_lead[1]
                 )
@@ -149,7 +147,7 @@ impl AnalysedLength {
         }
         self.whole_s().map(|whole_s| {
             format!(
-                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used whole, with a line every {:.3} Hz",
+                "imported records last {whole_s:.3} s, and the plan's length_s is {plan_s} s: they are used in full, with a line every {:.3} Hz",
                 1.0 / whole_s
             )
         })
@@ -368,7 +366,7 @@ impl CampaignFile {
 impl CampaignFile {
     fn level(&self, store: &Store, row: &LevelRow) -> Result<ShakerLevel, String> {
         if !row.gaps.is_empty() {
-            return Err("samples of it were lost on the way: measure it again".into());
+            return Err("some of its samples were lost during transmission: measure it again".into());
         }
         let channels = self.channels.get(&row.session).ok_or("its session is missing")?;
         let samples = store.level_samples(row).map_err(|error| error.to_string())?;
@@ -634,50 +632,6 @@ impl CampaignFile {
     }
 }
 
-/// Minimum, mean and maximum temperature, °C; `None` without measurements.
-fn temperature_c(store: &Store) -> Result<Option<[f64; 3]>, AnalyseError> {
-    let all: Vec<f64> = store.temperatures()?.iter().map(|row| row.celsius).collect();
-    let (least, most) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), celsius| {
-        (least.min(*celsius), most.max(*celsius))
-    });
-    let mean = all.iter().sum::<f64>() / all.len() as f64;
-    Ok((!all.is_empty()).then(|| [least, mean, most].map(|celsius| rounded(celsius, 4))))
-}
-
-/// The change made by every calibration, in the order of entry, relative to the first session to
-/// which it applies.
-fn calibrated(store: &Store) -> Result<Vec<Calibrated>, AnalyseError> {
-    let (sessions, all) = (store.sessions()?, store.calibrations()?);
-    let mut rows = Vec::new();
-    for (n, own) in all.iter().enumerate() {
-        // a calibration that applies from a session which never took place changed nothing
-        let Some((session, _)) = sessions.iter().find(|(id, _)| *id >= own.from_session) else { continue };
-        let map = store.channels_as_measured(*session)?;
-        let Some(channel) = map.channels.iter().find(|channel| channel.name == own.channel.as_str()) else {
-            continue;
-        };
-        let mut before = channel.clone();
-        let earlier =
-            all[..n].iter().filter(|old| old.channel == own.channel && old.from_session <= *session);
-        earlier.for_each(|old| old.apply(&mut before));
-        let mut now = before.clone();
-        own.apply(&mut now);
-        let sensor = [own.model.clone(), own.serial.clone(), own.calibrated.clone()];
-        rows.push(Calibrated {
-            utc: own.utc.clone(),
-            from_session: own.from_session,
-            channel: own.channel.clone(),
-            unit: channel.quantity.unit().into(),
-            sensitivity_v: [&before, &now].map(|c| rounded(1.0 / f64::from(c.units_per_volt), 7)),
-            delay_s: [&before, &now].map(|c| 1e-9 * f64::from(c.delay_ns)),
-            uncertainty: own.uncertainty,
-            sensor: sensor.into_iter().flatten().collect(),
-            reason: own.reason.clone(),
-        });
-    }
-    Ok(rows)
-}
-
 /// From counts per cell: whether the cell is struck itself rather than filled by the hits of
 /// another, and (planned, kept, refused by verdict).
 pub fn completeness<'a>(
@@ -698,40 +652,6 @@ pub fn completeness<'a>(
         }
     }
     sum
-}
-
-/// Why a campaign file cannot be analysed, or one of its cells cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum AnalyseError {
-    /// The file cannot be read, or a record is damaged.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// A channel that is required for analysing an impact is missing.
-    #[error("record {record}: its session has no channel for {role}")]
-    NoChannel {
-        /// The record.
-        record: i64,
-        /// The missing channel.
-        role: &'static str,
-    },
-    /// One cell has records of two sampling rates.
-    #[error(
-        "record {record} was sampled at {rate_hz} Hz, those before it at {others_hz} Hz: their spectra have other lines; refuse one or the other and measure again"
-    )]
-    Rate {
-        /// The record.
-        record: i64,
-        /// Its rate, Hz.
-        rate_hz: f64,
-        /// Rate of the earlier records, Hz.
-        others_hz: f64,
-    },
-    /// The response channels of the file's sessions measure different quantities, or a quantity
-    /// that is not motion.
-    #[error(
-        "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
-    )]
-    Quantity(String),
 }
 
 #[cfg(test)]

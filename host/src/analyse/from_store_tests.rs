@@ -278,7 +278,7 @@ fn records_from_files_are_used_whole_where_nothing_was_measured() {
     let said = |length: AnalysedLength| length.notice().expect("something to say");
     let longer = lengths(Some([4.0; 2]), false);
     assert_eq!(longer.whole_s(), Some(4.01));
-    assert!(said(longer).contains("last 4.010 s") && said(longer).contains("used whole"));
+    assert!(said(longer).contains("last 4.010 s") && said(longer).contains("used in full"));
     let shorter = lengths(Some([0.5; 2]), false);
     assert_eq!(shorter.whole_s(), Some(0.51));
     assert!(said(shorter).contains("every 1.961 Hz"));

@@ -1,12 +1,10 @@
 //! Identification from FRFs of any source: the requests of `jointrig identify` and of the Python
 //! module, and their results.
-//!
-//! Options of an analysis, and its progress.
 
-use super::cell::KnownContact;
-use super::findings::{Fit, NoFit, fits};
+use super::fits::{Fit, NoFit, fits};
+use super::wanted::BANDS;
 use super::{Findings, Missing, Substructured};
-use crate::results::{Joint, MAIN_BAND, Results, Source};
+use crate::results::{Joint, Results, Source};
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Priors, averaged};
 use crate::substructuring::{
@@ -55,7 +53,7 @@ impl Default for Question {
 pub enum QuestionError {
     /// None of the default bands contains a line of the files.
     #[error(
-        "none of the default bands holds a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
+        "none of the default bands contains a line of the files, which cover {first:?} to {last:?} Hz: give --band LO:HI"
     )]
     NoBand {
         /// First line, Hz.
@@ -236,30 +234,6 @@ impl FromStr for IdmSets {
         let set = IdmSet::of(&modes).ok_or_else(|| format!("`{text}` names a mode twice"))?;
         Ok(IdmSets(vec![set]))
     }
-}
-
-/// The bands over which means are computed, Hz; the first is the main one.
-pub const BANDS: [Band; 3] =
-    [MAIN_BAND, Band { low_hz: 100.0, high_hz: 800.0 }, Band { low_hz: 100.0, high_hz: 300.0 }];
-
-/// Additional results requested, and prior knowledge.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wanted {
-    /// Replicates of the bootstrap over hits; 0 for none.
-    pub replicates: usize,
-    /// Prior knowledge of contact and static arm.
-    pub known: KnownContact,
-    /// Whether the FRFs of every pair are kept in the findings.
-    pub frfs: bool,
-}
-
-/// Progress of the analysis: cells done, and total number of cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
-    /// Cells done.
-    pub done: usize,
-    /// Total number of cells.
-    pub total: usize,
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::cell::{CellName, ContactDelays, ContactSignals, Hit, Measurements};
 use super::checks::{HiddenResonance, SeriesCompliance};
 use super::findings::Findings;
 use super::missing::Missing;
-use super::question::{Progress, Wanted};
+use super::wanted::{Progress, Wanted};
 use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;

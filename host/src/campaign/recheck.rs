@@ -77,7 +77,7 @@ pub fn recheck(store: &Store, at: &dyn Fn(usize, usize)) -> Result<Rechecked, St
             let (id, was) = (level.id, level.held.show(level.reached));
             if !measured.iter().any(|amplitude| alike(*amplitude, level.reached)) {
                 let now = measured.first().map_or_else(String::new, |amplitude| level.held.show(*amplitude));
-                found.different.push(format!("level {id}: {was} in the file, and {now} from its codes"));
+                found.different.push(format!("level {id}: {was} in the file, but {now} from its codes"));
             }
         }
     }
@@ -212,7 +212,7 @@ impl<'s> Past<'s> {
         }
         Ok(first.map(|found| {
             format!(
-                "record {}: `{}` ({}; peak {:.2} N) in the file, and `{}` ({}; peak {:.2} N) from its codes",
+                "record {}: `{}` ({}; peak {:.2} N) in the file, but `{}` ({}; peak {:.2} N) computed from its codes",
                 record.id,
                 record.verdict,
                 record.sentence,

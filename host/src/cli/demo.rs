@@ -126,7 +126,7 @@ impl Demo {
                 )));
             }
         }
-        tell_line!("{} is there already: going on with it", file.display());
+        tell_line!("{} exists already: continuing with it", file.display());
         Ok(store)
     }
 }

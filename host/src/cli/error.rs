@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::advice;
 use crate::analyse::AnalyseError;
 use crate::campaign::plan::PlanError;
-use crate::campaign::run::runner::RunError;
+use crate::campaign::run::error::RunError;
 use crate::campaign::run::shaking::ShakeError;
 use crate::campaign::store::error::StoreError;
 use crate::device::error::DeviceError;

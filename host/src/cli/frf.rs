@@ -113,7 +113,8 @@ impl From<FrfQuantity> for MotionQuantity {
 
 /// Parses a frequency band, Hz.
 pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
-    let wrong = || format!("`{text}` is no band: give two frequencies in Hz, the lower first, as in 300:600");
+    let wrong =
+        || format!("`{text}` is not a band: give two frequencies in Hz, the lower first, as in 300:600");
     let (low, high) = text.split_once(':').ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|f| f.is_finite() && *f >= 0.0);
     match (number(low), number(high)) {
@@ -154,7 +155,7 @@ impl FrfArgs {
             found = found.band(low, high);
             if found.lines() == 0 {
                 return Err(CliError::Usage(format!(
-                    "there is no line between {low} and {high} Hz: widen --band"
+                    "there is no frequency line between {low} and {high} Hz: widen --band"
                 )));
             }
         }
@@ -240,7 +241,8 @@ impl FrfArgs {
         let most = of_used().max_by(|a, b| a.1.outside.total_cmp(&b.1.outside));
         if let Some((hit, window)) = most.filter(|(_, window)| window.outside > OUTSIDE) {
             lines.push(format!(
-                "hit {hit}: beside the force window the force has {:.1} % of the pulse's impulse, which is left out: it drifts, or something else pushes",
+                "hit {hit}: outside the force window the force has {:.1} % of the pulse's impulse, which is left out: the \
+                 signal drifts, or another force acts",
                 100.0 * window.outside
             ));
         }
@@ -251,8 +253,8 @@ impl FrfArgs {
         let alone = !self.json && self.outputs.is_empty() && self.delay.is_empty();
         let (Some(out), true) = (&self.out, alone) else {
             return Err(CliError::Bad(format!(
-                "{}: this is a folder: name a file in it, or give --out FILE.npz, and neither --json nor --outputs nor --delay, for a matrix \
-                 of FRFs of all its universal files",
+                "{}: this is a folder: name a file in it; or, for one matrix of FRFs of all its universal files, give --out \
+                 FILE.npz without --json, --outputs and --delay",
                 self.records.display()
             )));
         };
@@ -387,7 +389,7 @@ impl FrfArgs {
         }
         match &self.out {
             Some(path) => lines.push(format!("FRFs are in {}", path.display())),
-            None => lines.push("nothing was written: --out FILE.npz keeps the FRFs".into()),
+            None => lines.push("nothing was written: --out FILE.npz saves the FRFs".into()),
         }
         lines
     }

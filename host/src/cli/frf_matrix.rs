@@ -67,7 +67,7 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
                 took.push((taken, path.display().to_string()));
             }
             if pairs.iter().any(|pair| (&pair.impact, &pair.response) == (&impact, &response)) {
-                return Err(wrong(format!("{impact} to {response} stands in an earlier file too")));
+                return Err(wrong(format!("{impact} to {response} is in an earlier file too")));
             }
             let verdicts = judge_all(&records, &Limits::default(), None);
             let used: Vec<bool> = verdicts.iter().map(|v| v.kind == Verdict::Good).collect();
@@ -107,12 +107,13 @@ pub(super) fn average(folder: &Path, out: &Path, wishes: &Wishes<'_>) -> Result<
                 spectra = spectra.band(low, high);
             }
             if spectra.lines() == 0 {
-                return Err(CliError::Usage("--band holds no line: widen it".into()));
+                return Err(CliError::Usage("--band contains no frequency line: widen it".into()));
             }
             let same_lines =
                 |first: &Pair| same(first.spectra.frequency_hz(), spectra.frequency_hz()).is_ok();
             if !pairs.first().is_none_or(same_lines) {
-                return Err(of("it has other frequency lines than the files before it: records must be of one length and rate".into()));
+                return Err(of("its frequency lines differ from those of the files before it: all records need the same length \
+                    and rate".into()));
             }
             pairs.push(Pair { impact, response, spectra, directions });
         }

@@ -67,8 +67,8 @@ impl Agreement {
             }
             if turned_axes_agree(records, settings, excited) {
                 suspicions.push(
-                    "the hits agree when the first two axes of `response` change places: it may be (channel, hit, sample), and \
-                     (hit, channel, sample) is wanted; np.swapaxes(response, 0, 1) turns it"
+                    "the hits agree when the first two axes of `response` are swapped: it may be (channel, hit, sample), but \
+                     (hit, channel, sample) is needed; np.swapaxes(response, 0, 1) swaps them"
                         .into(),
                 );
             }
@@ -88,7 +88,7 @@ impl Agreement {
             })
             .collect();
         if lines.is_empty() {
-            lines.push("there is no coherence: it takes two good hits".into());
+            lines.push("there is no coherence: it needs at least two good hits".into());
         }
         lines.extend(self.suspicions.iter().cloned());
         lines
@@ -154,7 +154,7 @@ fn sentence(odd: &OddHit, hits: &[usize], names: &[String]) -> String {
     };
     let differs = format!("hit {hit} differs from {others} by {:.0} %", 100.0 * odd.difference);
     let Some(fit) = &odd.fit else {
-        return format!("{differs}: look whether a sensor, a cable or the place of impact was another one");
+        return format!("{differs}: check whether a sensor, a cable or the place of impact was changed");
     };
     match fit {
         Fit::Scaled(factor) => {
@@ -165,7 +165,7 @@ fn sentence(odd: &OddHit, hits: &[usize], names: &[String]) -> String {
                 .filter(|(_, (_, negative))| *negative)
                 .map(|(place, _)| name(names, place))
                 .collect();
-            format!("{differs}: it fits with the sign of {} turned round", turned.join(", "))
+            format!("{differs}: it fits with the sign of {} reversed", turned.join(", "))
         }
         Fit::Channels(own) => {
             let signed =
@@ -198,9 +198,9 @@ mod tests {
         assert!(text.contains("hit 2") && text.contains("85 %"), "{text}");
         assert!(text.contains("in the order b, −c, a (y, −z, x)"), "{text}");
         let text = say(2, Some(Fit::Channels(vec![(0, false), (1, true), (2, false)])));
-        assert!(text.contains("hit 3") && text.contains("sign of b turned round"), "{text}");
+        assert!(text.contains("hit 3") && text.contains("sign of b reversed"), "{text}");
         assert!(say(0, Some(Fit::Scaled(0.5))).contains("divided by 0.500"));
-        assert!(say(0, None).contains("look whether"));
+        assert!(say(0, None).contains("check whether"));
     }
 
     #[test]

@@ -155,7 +155,7 @@ fn read(path: &Path, points: &Configuration, units: &StatedUnits) -> Result<Frf,
 }
 
 fn band(text: &str) -> Result<Band, String> {
-    let wrong = || format!("`{text}` is no band: write LO:HI in Hz, for example 300:600");
+    let wrong = || format!("`{text}` is not a band: write LO:HI in Hz, for example 300:600");
     let (low, high) = text.split_once(':').ok_or_else(wrong)?;
     let number = |text: &str| f64::from_str(text.trim()).ok().filter(|f| f.is_finite() && *f >= 0.0);
     let (low_hz, high_hz) = (number(low).ok_or_else(wrong)?, number(high).ok_or_else(wrong)?);

@@ -180,7 +180,7 @@ impl Info {
         text.extend(sync.as_ref().map(sync_line));
         if !fits(&info.version) {
             text.push(format!(
-                "  this program is {HOST_VERSION} and speaks the same protocol; its own firmware is flashed from {}",
+                "  this program is version {HOST_VERSION} and speaks the same protocol; flash its firmware from {}",
                 flash_file(&self.device)
             ));
         }

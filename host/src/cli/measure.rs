@@ -91,6 +91,6 @@ fn tell(path: &Path, summary: &Summary, again: &str) {
         );
     }
     if summary.interrupted {
-        tell_line!("stopped; `{again}` goes on from here");
+        tell_line!("stopped; `{again}` continues from here");
     }
 }

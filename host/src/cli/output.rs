@@ -110,10 +110,10 @@ pub fn catch(stop: &Arc<AtomicBool>) {
             // everything accepted is already in the file
             std::process::exit(1);
         }
-        tell_line!("\nstopping after the shot in hand; Ctrl-C again ends at once");
+        tell_line!("\nstopping after the current shot; press Ctrl-C again to end immediately");
     });
     if let Err(error) = set {
-        log::warn!("Ctrl-C cannot be caught ({error}): it will end the program at once");
+        log::warn!("Ctrl-C cannot be caught ({error}): it will end the program immediately");
     }
 }
 

@@ -70,7 +70,7 @@ impl Page {
         let (page, hooks) = Dashboard::of_measuring(&measuring, port)?;
         tell_line!("live page: {}", page.url());
         if let Some(url) = page.edit_url() {
-            tell_line!("to take notes, keep and drop there: {url}");
+            tell_line!("to take notes and to keep or drop hits: {url}");
         }
         let opened = self.open.then(|| Opened::new(&page.edit_url().unwrap_or_else(|| page.url()))).flatten();
         Ok(Onlooker {
@@ -107,7 +107,7 @@ impl Opened {
         match Self::try_new(url) {
             Ok(opened) => Some(opened),
             Err(error) => {
-                tell_line!("no browser could be opened ({error}): open the address by hand");
+                tell_line!("no browser could be opened ({error}): open the address yourself");
                 None
             }
         }

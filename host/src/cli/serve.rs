@@ -53,7 +53,7 @@ impl Serve {
             (Some(file), Some(device)) => Run::with_page(file, device, page, self.allow_control).run(),
             (Some(file), None) => show(&file, page),
             (None, Some(device)) => show_channels(&device, page),
-            (None, None) => Err(CliError::Usage("say which FILE.jrig, or --device ADDR".into())),
+            (None, None) => Err(CliError::Usage("name a FILE.jrig, or give --device ADDR".into())),
         }
     }
 }

@@ -169,9 +169,7 @@ impl Shaker {
         let chosen = |own: &[f64], planned: Option<&Vec<f64>>, flag: &str| {
             let list = if own.is_empty() { planned.cloned().unwrap_or_default() } else { own.to_vec() };
             if list.is_empty() {
-                return Err(CliError::Usage(format!(
-                    "the plan has no levels of the shaker: say which by {flag}"
-                )));
+                return Err(CliError::Usage(format!("the plan has no shaker levels: give them with {flag}")));
             }
             Ok(list)
         };
@@ -193,14 +191,14 @@ impl Shaker {
         let (stored, known) =
             (count(|o| matches!(o, Outcome::Stored(_))), count(|o| matches!(o, Outcome::Known(_))));
         let path = advice::quoted(&self.file);
-        tell_line!("{path}: {stored} levels recorded, {known} were there; the shaker is at rest");
+        tell_line!("{path}: {stored} levels recorded, {known} were there already; the shaker is at rest");
         if summary.interrupted && summary.outcomes.len() < options.levels.len() {
-            return Err(CliError::Bad("stopped; the same command goes on from here".into()));
+            return Err(CliError::Bad("stopped; run the same command again to continue from here".into()));
         }
         let short = count(|o| matches!(o, Outcome::Short(..)));
         if short > 0 {
             let message =
-                format!("{short} of {} levels were not reached, as said above", options.levels.len());
+                format!("{short} of {} levels were not reached; the reasons are above", options.levels.len());
             return Err(CliError::Bad(message));
         }
         tell_line!("next: jointrig analyse {path} --out DIR");
@@ -290,8 +288,8 @@ fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
 /// Asks the person at the rig for confirmation before anything moves.
 fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
     tell(&format!(
-        "\n{levels} levels of the shaker. On the table: the assembly, under its normal load; the stinger attached, the amplifier on, \
-         nobody's hand near the rig.\n"
+        "\n{levels} levels of the shaker. Check that the assembly is on the table under its normal load, the stinger is attached, the \
+         amplifier is on and nobody touches the rig.\n"
     ));
     if yes {
         tell_line!("ready? yes (--yes)");
@@ -304,7 +302,7 @@ fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
     match std::io::stdin().lock().read_line(&mut line) {
         Ok(length) if length > 0 && line.trim().is_empty() => Ok(()),
         Ok(length) if length > 0 => Err(CliError::Bad("stopped at the prompt; nothing has moved".into())),
-        _ => Err(CliError::Bad("nobody is there to answer (no terminal): use --yes".into())),
+        _ => Err(CliError::Bad("a person must answer, and there is no terminal: use --yes".into())),
     }
 }
 

@@ -17,7 +17,7 @@ use serde_json::json;
 use tokio::sync::oneshot;
 
 use super::Shared;
-use super::routes::Problem;
+use super::problem::Problem;
 use crate::campaign::run::answers::{Answerer, Key, Question};
 use crate::campaign::run::answers::{Edit, EditQueue, NotTaken};
 use crate::campaign::verdict::Verdict;
@@ -70,7 +70,7 @@ fn read<T>(asked: EditRequest<T>) -> Result<T, Problem> {
 impl Shared {
     fn controls(&self) -> Result<&Controls, Problem> {
         self.controls.as_ref().ok_or_else(|| {
-            let what = "this server only looks: nothing is measured in its process";
+            let what = "this server is read-only: nothing is measured in its process";
             Problem::new(StatusCode::FORBIDDEN, what, "use `jointrig campaign keep` and `campaign drop`")
         })
     }
@@ -98,7 +98,7 @@ async fn handed_in(shared: &Shared, edit: Edit) -> Result<Response, Problem> {
     match taken {
         Ok(()) => {}
         Err(NotTaken::Busy) => {
-            let what = "too many changes wait already";
+            let what = "too many changes are waiting already";
             return Err(Problem::new(StatusCode::TOO_MANY_REQUESTS, what, "try again in a moment"));
         }
         Err(NotTaken::Over) => return Err(over()),
@@ -108,7 +108,7 @@ async fn handed_in(shared: &Shared, edit: Edit) -> Result<Response, Problem> {
         Ok(Ok(Err(wrong))) => Err(Problem::new(StatusCode::CONFLICT, wrong, "look at the log")),
         Ok(Err(_)) => Err(over()),
         Err(_) => {
-            let later = json!({ "later": "it is written when the file's writer comes to it" });
+            let later = json!({ "later": "it will be written as soon as the measuring process can do so" });
             Ok((StatusCode::ACCEPTED, Json(later)).into_response())
         }
     }
@@ -123,7 +123,7 @@ fn over() -> Problem {
 fn text(given: &str) -> Result<String, Problem> {
     let text = given.split_whitespace().collect::<Vec<_>>().join(" ");
     if text.is_empty() || text.chars().count() > LONGEST {
-        let what = format!("a text has 1 to {LONGEST} characters");
+        let what = format!("a text must have 1 to {LONGEST} characters");
         return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, "write another one"));
     }
     Ok(text)
@@ -180,7 +180,7 @@ async fn undo(
 
 async fn stop(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
     shared.controls()?.stop.store(true, Ordering::Relaxed);
-    let done = "measuring ends after the shot in hand; this is no emergency stop";
+    let done = "measuring ends after the current shot; this is not an emergency stop";
     Ok(Json(json!({ "done": done })).into_response())
 }
 
@@ -195,7 +195,7 @@ async fn control(State(shared): State<Arc<Shared>>, asked: EditRequest<Hold>) ->
     let controls = shared.controls()?;
     allowed(controls)?;
     if page.is_empty() || page.chars().count() > NAME {
-        let what = format!("a page's name has 1 to {NAME} characters");
+        let what = format!("a page's name must have 1 to {NAME} characters");
         return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, "choose another one"));
     }
     let mut lease = controls.lease.lock().unwrap_or_else(PoisonError::into_inner);
@@ -223,7 +223,7 @@ fn allowed(controls: &Controls) -> Result<&Answerer, Problem> {
 }
 
 fn elsewhere() -> Problem {
-    Problem::new(StatusCode::CONFLICT, "another page answers", "let go there, or wait ten seconds")
+    Problem::new(StatusCode::CONFLICT, "another page answers", "press “let go” there, or wait ten seconds")
 }
 
 #[derive(Deserialize)]
@@ -247,7 +247,7 @@ async fn stage(
         "skip" => Key::Skip,
         "back" => Key::Back,
         _ => {
-            let what = format!("`{answer}` is no answer");
+            let what = format!("`{answer}` is not an answer");
             let todo = "send `in place`, `redo`, `skip` or `back`";
             return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, what, todo));
         }
@@ -264,8 +264,8 @@ async fn stage(
     let asks = shared.bus.state().filter(|state| state.what == Doing::MoveByHand);
     let current = asks.is_some_and(|state| state.cell == Some(cell) && state.attempt == attempt);
     if !(current && answerer.give(Question { cell, attempt }, key)) {
-        let what = "this is not what is asked now";
-        return Err(Problem::new(StatusCode::CONFLICT, what, "look at what the page asks, and answer that"));
+        let what = "this answers another question than the current one";
+        return Err(Problem::new(StatusCode::CONFLICT, what, "read what the page asks, and answer that"));
     }
     Ok(Json(json!({ "done": answer })).into_response())
 }

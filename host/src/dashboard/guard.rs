@@ -59,14 +59,14 @@ impl Refusal {
     /// What is wrong, and what to do.
     pub fn words(self) -> [&'static str; 2] {
         match self {
-            Self::Host => ["this server has no such name", "open the address that jointrig printed"],
-            Self::Origin => ["another page asked", "open the address that jointrig printed"],
+            Self::Host => ["the address names another server", "open the address that jointrig printed"],
+            Self::Origin => ["the request comes from another page", "open the address that jointrig printed"],
             Self::Token => [
                 "the token is missing or wrong",
-                "open the whole address that jointrig printed, with what follows the #",
+                "open the whole address that jointrig printed, including the part after the #",
             ],
             Self::LooksOnly => [
-                "this address is one to look",
+                "this address allows only looking",
                 "open the address to edit, which the measuring process printed",
             ],
         }

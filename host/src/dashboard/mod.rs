@@ -9,8 +9,10 @@
 mod edit;
 mod guard;
 mod page;
+mod problem;
 mod routes;
 mod server;
+mod socket;
 
 use std::io;
 use std::net::SocketAddr;

@@ -1,9 +1,8 @@
 //! Routes of the server and their handlers.
-//!
-//! Error responses: what is wrong, where, and what to do.
 
 use super::guard::{Refusal, from_here, token};
-use super::{Shared, edit, page, server};
+use super::problem::Problem;
+use super::{Shared, edit, page, socket};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::live::numbers::drawn;
@@ -50,7 +49,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
             "/live.js",
             get(async || ([(header::CONTENT_TYPE, "text/javascript; charset=utf-8")], page::script())),
         )
-        .route("/socket", get(server::socket))
+        .route("/socket", get(socket::socket))
         .merge(data)
         .merge(edits)
         .fallback(async || Problem::missing("there is no such page"))
@@ -211,44 +210,4 @@ async fn log(State(shared): State<Arc<Shared>>, Query(asked): Query<After>) -> R
     let lines: Vec<_> =
         lines.iter().map(|(id, utc, text)| json!({ "id": id, "utc": utc, "text": text })).collect();
     Ok(Json(lines).into_response())
-}
-
-/// Why a request could not be answered.
-pub struct Problem {
-    status: StatusCode,
-    what: String,
-    todo: &'static str,
-}
-
-impl Problem {
-    /// A problem with this status.
-    pub fn new(status: StatusCode, what: impl Into<String>, todo: &'static str) -> Self {
-        Self { status, what: what.into(), todo }
-    }
-
-    /// A problem with status 404, not found.
-    pub fn missing(what: &str) -> Self {
-        Self::new(StatusCode::NOT_FOUND, what, "go back to the page")
-    }
-}
-
-impl From<Refusal> for Problem {
-    fn from(refusal: Refusal) -> Self {
-        let [what, todo] = refusal.words();
-        Self::new(refusal.status(), what, todo)
-    }
-}
-
-impl From<StoreError> for Problem {
-    fn from(error: StoreError) -> Self {
-        Self::new(StatusCode::NOT_FOUND, error.to_string(), "look at the campaign file")
-    }
-}
-
-impl IntoResponse for Problem {
-    fn into_response(self) -> Response {
-        let body =
-            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
-        (self.status, Json(body)).into_response()
-    }
 }

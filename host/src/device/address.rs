@@ -9,8 +9,6 @@
 //! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one, or by serial |
 //! | `replay:` | known, but not supported by this version |
 //!
-//! Byte transport to and from a device.
-//!
 //! `tcp:HOST:PORT`: a device connected by a socket (a virtual board, or a bridge).
 //!
 //! `sim:` and `sim:RIG.toml`: the simulated rig in this process.
@@ -20,6 +18,7 @@
 //! into the campaign file, and no estimator reads them.
 
 use super::error::DeviceError;
+use super::transport::{Simulated, Transport};
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use jointrig_hil_sim::board::{Options, VirtualBoard};
@@ -139,55 +138,6 @@ fn open_sim(rig: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transpo
         given: Address::Sim { rig: rig.map(Into::into) }.to_string(),
         scheme: "sim".into(),
     })
-}
-
-/// A byte pipe to one device. It does not preserve frames: bytes may arrive in pieces of any size,
-/// and may be lost.
-pub trait Transport: Send {
-    /// Reads the available bytes into `buf`, waiting at most `timeout` for the first one.
-    ///
-    /// Returns the number of bytes read; 0 means that nothing arrived in time.
-    ///
-    /// # Errors
-    /// The device or its cable was disconnected.
-    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize>;
-
-    /// Writes all of `bytes`.
-    ///
-    /// # Errors
-    /// The device or its cable was disconnected.
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
-
-    /// Whether the device's packets arrive as they were sent. A device may then omit byte stuffing
-    /// ([`jointrig_protocol::packet`]).
-    fn keeps_packets(&self) -> bool {
-        false
-    }
-
-    /// The firmware image with which the device was started, where it is known; it contains the log
-    /// strings.
-    fn image(&self) -> Option<&Path> {
-        None
-    }
-
-    /// The rig's description when the device is simulated in this process; `None` for any other
-    /// device. It is taken from the rig's parameters and is not transmitted over the link.
-    fn simulated(&self) -> Option<Simulated> {
-        None
-    }
-}
-
-/// A device that is simulated in this process.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Simulated {
-    /// The rig's name.
-    pub rig: String,
-    /// The seed of its scatter.
-    pub seed: u64,
-    /// SHA-256 of all its parameters, base64.
-    pub parameters: String,
-    /// What an ideal measurement of it would find, as JSON.
-    pub truth: serde_json::Value,
 }
 
 impl<T: Transport + ?Sized> Transport for Box<T> {

@@ -40,7 +40,7 @@ fn refuse(holds: bool, what: impl FnOnce() -> String) -> Claim {
 pub(super) fn of_hello(hello: &Hello) -> Claim {
     refuse(RING_SCANS.contains(&hello.ring_scans), || {
         format!(
-            "says that it keeps {} scans to send again: {} to {} can be",
+            "says that it keeps {} scans to send again: {} to {} are possible",
             hello.ring_scans,
             RING_SCANS.start(),
             RING_SCANS.end()
@@ -52,21 +52,21 @@ pub(super) fn of_hello(hello: &Hello) -> Claim {
 pub(super) fn of_info(info: &Info, hello: &Hello) -> Claim {
     let Info { channels, scan_rate_hz, ring_scans, coil_cap_us, drive_v, .. } = *info;
     refuse((1..=MAX_CHANNELS).contains(&usize::from(channels)), || {
-        format!("says that a scan has {channels} channels: 1 to {MAX_CHANNELS} can be")
+        format!("says that a scan has {channels} channels: 1 to {MAX_CHANNELS} are possible")
     })?;
     refuse(RATE_HZ.contains(&scan_rate_hz), || {
         format!(
-            "says that it takes {scan_rate_hz} scans a second: {} to {} can be",
+            "says that it takes {scan_rate_hz} scans a second: {} to {} are possible",
             RATE_HZ.start(),
             RATE_HZ.end()
         )
     })?;
     refuse(ring_scans == hello.ring_scans, || {
-        format!("says that it keeps {ring_scans} scans, and said {} before", hello.ring_scans)
+        format!("says that it keeps {ring_scans} scans, but said {} before", hello.ring_scans)
     })?;
     refuse(coil_cap_us <= COIL_PULSE_CAP_US, || {
         format!(
-            "says that its coil takes pulses of {coil_cap_us} µs: {COIL_PULSE_CAP_US} µs is the most that any may"
+            "says that its coil takes pulses of {coil_cap_us} µs: at most {COIL_PULSE_CAP_US} µs are allowed"
         )
     })?;
     refuse(drive_v.is_finite() && drive_v >= 0.0, || format!("says that its drive gives {drive_v} V"))
@@ -76,7 +76,7 @@ pub(super) fn of_info(info: &Info, hello: &Hello) -> Claim {
 pub(super) fn of_channel(channel: &Channel, before: &[Channel]) -> Claim {
     let (place, name) = (before.len(), channel.name.as_str());
     refuse(!name.trim().is_empty() && before.iter().all(|other| other.name != channel.name), || {
-        format!("calls channel {place} `{name}`: each needs a name of its own")
+        format!("calls channel {place} `{name}`, like another one: each needs its own name")
     })?;
     let Channel { units_per_volt, range_v, delay_ns, bits, .. } = *channel;
     refuse(units_per_volt.is_normal(), || {
@@ -91,9 +91,9 @@ pub(super) fn of_channel(channel: &Channel, before: &[Channel]) -> Claim {
         format!("says that a code of `{name}` is {} units", channel.units_per_code_f32())
     })?;
     refuse(delay_ns <= DELAY_NS, || {
-        format!("says that `{name}` lags by {delay_ns} ns: at most {DELAY_NS} can be")
+        format!("says that `{name}` lags by {delay_ns} ns: at most {DELAY_NS} are possible")
     })?;
-    refuse((1..=32).contains(&bits), || format!("says that `{name}` has {bits} bits: 1 to 32 can be"))
+    refuse((1..=32).contains(&bits), || format!("says that `{name}` has {bits} bits: 1 to 32 are possible"))
 }
 
 /// Checks the slow values.
@@ -101,12 +101,12 @@ pub(super) fn of_slow(slow: &Slow) -> Claim {
     let celsius = slow.temperature_c.unwrap_or(0.0);
     refuse((-273.2..=2000.0).contains(&celsius), || format!("says that the specimen has {celsius} °C"))?;
     let strange = slow.supplies.iter().find(|supply| !supply.bias_v.is_finite());
-    refuse(strange.is_none(), || "says that a supply's bias is no number".into())
+    refuse(strange.is_none(), || "says that a supply's bias is not a number".into())
 }
 
 /// Checks the index of a scan.
 fn scan(what: &str, at: u64) -> Claim {
-    refuse(at <= LAST_SCAN, || format!("says that {what} at scan {at}: no stream comes so far"))
+    refuse(at <= LAST_SCAN, || format!("says that {what} at scan {at}: no stream gets that far"))
 }
 
 fn of_shot(shot: &Shot) -> Claim {
@@ -130,7 +130,7 @@ fn of_counters(counters: &Counters) -> Claim {
 }
 
 fn of_status(status: &Status) -> Claim {
-    scan("the next one stands", status.next_scan)?;
+    scan("the next one is", status.next_scan)?;
     scan("its ring begins", status.oldest_scan)?;
     of_counters(&status.counters)?;
     status.shot.as_ref().map_or(Ok(()), of_shot)

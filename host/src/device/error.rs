@@ -92,7 +92,7 @@ pub enum DeviceError {
         refusal: Box<Refusal>,
     },
     /// The answer does not match the request.
-    #[error("{address} answered `{request}` with something else ({got}): firmware and program do not fit")]
+    #[error("{address} answered `{request}` with something else ({got}): firmware and program do not match")]
     WrongAnswer {
         /// The device.
         address: String,
@@ -114,7 +114,7 @@ pub enum DeviceError {
     },
     /// A report of the device is impossible.
     #[error(
-        "{address} {what}; nothing more is done with it: check its firmware ({}), then run the same command again",
+        "{address} {what}; it is not used any further: check its firmware ({}), then run the same command again",
         flash_file(address)
     )]
     Nonsense {

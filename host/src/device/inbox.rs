@@ -176,7 +176,7 @@ impl Inbox {
                     let lost = *first_scan..first_scan.saturating_add(u64::from(*scans));
                     if !stream.mark_lost(lost) {
                         self.nonsense = Some(
-                            "reports more losses than a stream has room for, all of them ahead of its scans"
+                            "reports more losses than a stream can store, all of them ahead of its scans"
                                 .into(),
                         );
                     }
@@ -202,7 +202,7 @@ impl Inbox {
             .map_or(0, |before| edge.number.wrapping_sub(before).wrapping_sub(1));
         if lost > 0 {
             log::warn!(
-                "{lost} edges of the sync port were not told before {edge:?}: they came too fast, or the link lost them"
+                "{lost} edges of the sync port were not reported before {edge:?}: they came too fast, or the link lost them"
             );
         }
         if self.edges.len() < EDGES_KEPT {

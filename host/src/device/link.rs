@@ -6,7 +6,7 @@ use std::time::Duration;
 use jointrig_protocol::frame::{Frame, FrameError, Kind, Writer};
 use jointrig_protocol::packet::Reader;
 
-use super::address::Transport;
+use super::transport::Transport;
 
 /// Bytes read in one call: over a hundred full blocks.
 const READ_BYTES: usize = 65_536;

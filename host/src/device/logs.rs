@@ -47,7 +47,7 @@ impl Tables {
     /// A sentence with the places searched and what was wrong with each.
     fn find(&self, build: u64, image: Option<&Path>) -> Result<Table, String> {
         if image.is_none() && self.folders.is_empty() {
-            return Err("no place to look was named".into());
+            return Err("no folder to search was named".into());
         }
         let mut looked = Vec::new();
         let places = image.map(Path::to_path_buf).into_iter();
@@ -105,10 +105,9 @@ impl DeviceLog {
                 Ok(table) => LogDecoder::With(Box::new(table)),
                 Err(looked) => {
                     log::warn!(
-                        "{}: what the controller logs cannot be shown, for want of the table of build \
-                         {build:016x} ({looked}): put the image that it runs into one of these folders as {}, as \
-                         `cargo xtask firmware` does with what it builds, or name another folder by --log-tables or \
-                         {FOLDER_VARIABLE}",
+                        "{}: the controller's log cannot be shown, because the table of build {build:016x} is missing ({looked}): \
+                         put the image that it runs into one of these folders as {} (`cargo xtask firmware` \
+                         does this with what it builds), or name another folder with --log-tables or {FOLDER_VARIABLE}",
                         self.address,
                         file_name(build)
                     );
@@ -129,7 +128,7 @@ impl DeviceLog {
                     self.lines.push_back(line);
                 });
                 if lost > 0 {
-                    log::debug!("{lost} bytes of the controller's log make no line");
+                    log::debug!("{lost} bytes of the controller's log could not be decoded");
                 }
                 self.undecoded += lost as u64;
             }

@@ -1,6 +1,6 @@
 //! Devices: addresses, byte transports, sessions, and the records cut from their streams.
 //!
-//! [`address::Address`] opens a [`address::Transport`]; [`session::Session`] runs the protocol
+//! [`address::Address`] opens a [`transport::Transport`]; [`session::Session`] runs the protocol
 //! over it and assembles the stream of scans, whatever the link loses; [`stream::Recording`] is
 //! one impact cut from it. A [`tap`] lets another thread view the stream.
 
@@ -18,4 +18,5 @@ mod serial;
 pub mod session;
 pub mod stream;
 pub mod tap;
+pub mod transport;
 pub mod usb;

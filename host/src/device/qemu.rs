@@ -8,8 +8,8 @@ use std::time::Duration;
 use jointrig_hil_sim::board::qemu::QemuBoard;
 use jointrig_hil_sim::link::HostEnd;
 
-use super::address::Transport;
 use super::error::DeviceError;
+use super::transport::Transport;
 
 /// Environment variable with the path of the image, used if the address has none.
 pub const IMAGE_VARIABLE: &str = "JOINTRIG_MPS2_IMAGE";
@@ -47,8 +47,8 @@ impl Qemu {
             .or_else(built)
             .ok_or_else(|| {
                 open(format!(
-                    "there is no firmware image: build one with `cargo xtask firmware --board mps2-an505`; one that \
-                     lies elsewhere is named by qemu:IMAGE or {IMAGE_VARIABLE}"
+                    "there is no firmware image: build one with `cargo xtask firmware --board mps2-an505`; name one \
+                     in another folder with qemu:IMAGE or {IMAGE_VARIABLE}"
                 ))
             })?;
         let (board, link) = QemuBoard::start(&image, None, seed).map_err(|error| open(error.to_string()))?;

@@ -155,7 +155,7 @@ impl Session {
                 address: self.address.clone(),
                 speaks: (self.hello.major, self.hello.minor),
                 needs: (self.hello.major, SCALES_SINCE),
-                what: "be told how its sensors are calibrated, and acts on what it was built with",
+                what: "receive the calibration of its sensors, so that it uses the values it was built with",
             });
         }
         self.scaled = true;
@@ -407,7 +407,7 @@ impl Session {
         if self.shakes
             && let Err(error) = self.background(Request::Rest)
         {
-            log::warn!("{error}; the shaker comes to rest by itself, one second after the last word");
+            log::warn!("{error}; the shaker comes to rest by itself, one second after the last command");
         }
     }
 }
@@ -441,7 +441,7 @@ impl Session {
                 address: self.address.clone(),
                 speaks: (self.hello.major, self.hello.minor),
                 needs: (self.hello.major, SINCE),
-                what: "take an external clock or tell of edges at its sync input, as the plan's [sync] asks",
+                what: "use an external clock or report edges at its sync input, as the plan's [sync] asks",
             });
         }
         self.ask_done(Request::Clock(clock))?;
@@ -451,7 +451,7 @@ impl Session {
                 Some(sync) if sync.clock == clock && sync.fault.is_none() => return Ok(sync),
                 Some(Sync { fault: Some(fault), .. }) => fault,
                 // another clock is in use
-                _ => return Err(self.nonsense("does not take the clock that it was told to take".into())),
+                _ => return Err(self.nonsense("does not use the clock that it was told to use".into())),
             };
             if fault != ClockFault::Unproven || Instant::now() > give_up {
                 return Err(DeviceError::Clock { address: self.address.clone(), fault });

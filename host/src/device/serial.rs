@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use serialport::{ErrorKind, SerialPort};
 
-use super::address::Transport;
 use super::error::{DeviceError, INSTALL_UDEV_RULE};
+use super::transport::Transport;
 
 /// Any rate works: USB serial ports ignore it.
 const BAUD: u32 = 921_600;
@@ -43,7 +43,7 @@ impl Serial {
         })?;
         // A pseudo-terminal has no modem lines; a USB port only sends once DTR is set.
         if let Err(error) = port.write_data_terminal_ready(true) {
-            log::debug!("serial:{name}: DTR cannot be set ({error}); taken for a pseudo-terminal");
+            log::debug!("serial:{name}: DTR cannot be set ({error}); treated as a pseudo-terminal");
         }
         Ok(Self { port, timeout })
     }

@@ -26,13 +26,13 @@ use jointrig_protocol::hello::{Hello, Mismatch};
 use jointrig_protocol::request::{Numbered, Request};
 use jointrig_protocol::shot::Shot;
 
-use super::address::{Simulated, Transport};
 use super::claims;
 use super::error::DeviceError;
 use super::inbox::Inbox;
 use super::link::Link;
 use super::logs::{DeviceLog, Tables};
 use super::stream::{Accounts, Stream};
+use super::transport::{Simulated, Transport};
 
 /// The line counts as idle when nothing arrived for this long.
 const IDLE: Duration = Duration::from_millis(20);
@@ -384,7 +384,7 @@ impl Session {
         self.resend_tries.0 = range.start;
         let Some(stream) = &mut self.inbox.stream else { return Ok(()) };
         if self.resend_tries.1 > RESEND_TRIES {
-            log::error!("scans {range:?} were asked for {RESEND_TRIES} times and never came");
+            log::error!("scans {range:?} were requested {RESEND_TRIES} times and never arrived");
             stream.mark_lost(range);
             return Ok(());
         }

@@ -161,7 +161,7 @@ fn frf_factor(
 
 /// Labels with the directions of an array, one for each name.
 fn directions(file: &mut NpzFile, array: &str, names: &[String]) -> Result<Vec<Label>, NpzError> {
-    let expected = "±1, 2 or 3 along x, y or z for each name, 0 where none is told";
+    let expected = "±1, 2 or 3 along x, y or z for each name, 0 where it is unknown";
     let all = if file.has(array) { file.real(array, expected)?.values } else { vec![0.0; names.len()] };
     if all.len() != names.len() {
         return Err(file.unexpected(

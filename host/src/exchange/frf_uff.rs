@@ -102,7 +102,7 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
         ));
     }
     if real > 0 {
-        notes.push(format!("{real} functions of type 4 have real values, which are no FRFs; left out"));
+        notes.push(format!("{real} functions of type 4 have real values, so they are not FRFs; left out"));
     }
     let labels =
         |of: fn(&Function) -> &Dof| -> Vec<Label> { functions.iter().map(|(f, ..)| label(of(f))).collect() };
@@ -150,7 +150,7 @@ pub fn from_contents(contents: &Contents, stated: &StatedUnits) -> Result<Labell
     let bytes = (pairs.saturating_mul(16).saturating_add(LINE)).saturating_mul(lines);
     if bytes > OF_HOLES.saturating_mul(there * lines * 16).saturating_add(MOST_OF_FEW) {
         return Err(format!(
-            "{there} FRFs of {lines} lines name {} outputs and {} inputs, a matrix that is mostly holes: split the file",
+            "{there} FRFs of {lines} lines name {} outputs and {} inputs, a matrix that is mostly empty: split the file",
             rows.len(),
             columns.len()
         ));
@@ -301,7 +301,7 @@ pub(super) fn left_out(contents: &Contents) -> Vec<String> {
     }
     for outside in contents.outside.iter().take(MOST_TOLD) {
         told.push(format!(
-            "text outside the data sets is passed over: {} lines from byte {}, beginning `{}`",
+            "text outside the data sets is ignored: {} lines from byte {}, beginning `{}`",
             outside.lines, outside.offset, outside.text
         ));
     }
@@ -380,7 +380,7 @@ fn input_names(labels: &[Label]) -> Vec<String> {
 fn sigma(f: &Function) -> Result<f64, String> {
     let words: Vec<&str> = f.id[3].split_whitespace().collect();
     match words[..] {
-        ["sigma", value, "1/s"] => value.parse().map_err(|_| format!("`{}` is no damping", f.id[3])),
+        ["sigma", value, "1/s"] => value.parse().map_err(|_| format!("`{}` is not a damping", f.id[3])),
         _ => Ok(0.0),
     }
 }

@@ -4,21 +4,9 @@
 //! Signed directions of labels: ±1, 2, 3 along x, y, z. A value is along its label's signed
 //! direction; this module compares it with the direction that a plan or a geometry gives for the
 //! same point.
-//!
-//! Reads an FRF file of either format, npz or universal file. Its first bytes determine the format,
-//! not its name.
 
-use super::frf_npz::read_labelled;
-use super::frf_uff::{FrfUffError, read_frf_uff};
-use super::npz::NpzError;
-use super::other_formats::{Contents, not_read_here};
-use super::units::StatedUnits;
 use crate::frf::Frf;
 use crate::substructuring::geometry::{Configuration, Point};
-use crate::{advice, untrusted_input};
-use std::io;
-use std::io::Read;
-use std::path::{Path, PathBuf};
 
 /// The label of an output or an input.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -170,7 +158,7 @@ fn look(
         Beside::Untold | Beside::Other if is_named => Ok(false),
         Beside::Untold => {
             told.push(format!(
-                "{}: labelled {axis}, and no label can name its direction {}, which counts",
+                "{}: labelled {axis}, but no label can name its direction {}, which is used",
                 point.description,
                 vector_name(point.direction)
             ));
@@ -252,70 +240,6 @@ pub(super) fn turned_words(turned: &[(String, i64)]) -> Option<String> {
 /// As [`vector_name`], for several directions.
 pub(super) fn vector_names(all: &[[f64; 3]]) -> String {
     all.iter().map(|axis| vector_name(*axis)).collect::<Vec<_>>().join(", ")
-}
-
-/// Why FRFs could not be read from a file.
-#[derive(Debug, thiserror::Error)]
-pub enum FrfFileError {
-    /// The file cannot be read.
-    #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: io::Error,
-    },
-    /// The file has a known format that is not supported.
-    #[error("{}: {said}", path.display())]
-    OtherFormat {
-        /// The file.
-        path: PathBuf,
-        /// The format, and how to convert the file to npz.
-        said: String,
-    },
-    /// It is an npz file that holds no FRFs.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// It is not an npz file, and as a universal file it holds no FRFs.
-    #[error(transparent)]
-    Uff(#[from] FrfUffError),
-}
-
-/// Whether the file is an archive of arrays.
-///
-/// # Errors
-/// It cannot be read.
-pub fn is_npz(path: &Path) -> Result<bool, FrfFileError> {
-    let mut first = Vec::new();
-    untrusted_input::open(path)
-        .and_then(|(file, _)| file.take(4).read_to_end(&mut first))
-        .map_err(|source| FrfFileError::Open { path: path.into(), source })?;
-    // a zip archive begins with its first entry, an empty one with its end
-    Ok(first.starts_with(b"PK\x03\x04") || first.starts_with(b"PK\x05\x06"))
-}
-
-/// Refuses a file of another program's format, naming the format and how to convert it to npz.
-///
-/// # Errors
-/// [`FrfFileError::OtherFormat`], [`FrfFileError::Open`].
-pub(super) fn refuse_other_formats(path: &Path, wanted: Contents) -> Result<(), FrfFileError> {
-    match not_read_here(path, wanted) {
-        Ok(None) => Ok(()),
-        Ok(Some(said)) => Err(FrfFileError::OtherFormat { path: path.into(), said }),
-        Err(source) => Err(FrfFileError::Open { path: path.into(), source }),
-    }
-}
-
-/// Reads FRFs from an npz or a universal file, in SI. `stated` units override the file's.
-///
-/// # Errors
-/// [`FrfFileError`] with the file and what is wrong in it.
-pub fn read_frf_file(path: &Path, stated: &StatedUnits) -> Result<LabelledFrf, FrfFileError> {
-    if is_npz(path)? {
-        return Ok(read_labelled(path, stated)?);
-    }
-    refuse_other_formats(path, Contents::Frfs)?;
-    Ok(read_frf_uff(path, stated)?)
 }
 
 #[cfg(test)]
@@ -424,6 +348,6 @@ mod tests {
         let text = said(label("L", "L", 3), label("AZ1", "AZ1", 2)).expect_err("y is not z");
         assert!(text.contains("hammer AZ1") && text.contains("+y") && text.contains("−z"), "{text}");
         let (_, told) = said(label("S", "S", 3), good).expect("no label can say it");
-        assert!(told[0].contains("(0.707, 0.707, 0)"), "{told:?}");
+        assert!(told[0].contains("(0.6, 0.8, 0)"), "{told:?}");
     }
 }

@@ -13,6 +13,7 @@
 #[cfg(test)]
 mod any_bytes_tests;
 pub mod channel_records;
+pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod labelled_frf;
@@ -38,10 +39,10 @@ pub use jointrig_uff as uff;
 
 pub(crate) use tables::delimiter;
 
+pub use frf_file::{FrfFileError, read_frf_file};
 pub use frf_npz::{Extra, read_frf, write_frf};
 pub use frf_uff::FrfUffError;
 pub use labelled_frf::LabelledFrf;
-pub use labelled_frf::{FrfFileError, read_frf_file};
 pub use npz::NpzError;
 pub use positions::{GeometryFileError, read_geometry};
 pub use positions::{PositionsError, read_positions};

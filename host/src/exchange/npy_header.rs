@@ -49,9 +49,9 @@ impl Header {
             version => return Err(damaged(&format!("version {version} of numpy's format is not known"))),
         };
         if length > MOST_BYTES {
-            return Err(damaged(&format!("its header has {length} bytes, at most {MOST_BYTES} make sense")));
+            return Err(damaged(&format!("its header has {length} bytes, at most {MOST_BYTES} are allowed")));
         }
-        let text = String::from_utf8(exactly(length)?).map_err(|_| damaged("its header is no text"))?;
+        let text = String::from_utf8(exactly(length)?).map_err(|_| damaged("its header is not text"))?;
         Words { rest: &text }.header()
     }
 
@@ -80,7 +80,7 @@ impl<'t> Words<'t> {
                 "descr" => descr = Some(self.quoted()?),
                 "fortran_order" => fortran = Some(self.truth()?),
                 "shape" => shape = Some(self.numbers()?),
-                _ => return Err(self.wrong(&format!("`{}` is no key of a header", key.escape_debug()))),
+                _ => return Err(self.wrong(&format!("`{}` is not a key of a header", key.escape_debug()))),
             }
             if !self.takes(',') {
                 self.sign('}')?;

@@ -76,8 +76,8 @@ impl NpzFile {
             return Ok(());
         }
         let found = format!(
-            "would take {} of memory, and what a file of {} holds may take {} in all: split it, or store it uncompressed and as \
-             floats (np.savez)",
+            "would take {} of memory, but the arrays of a file of {} may take only {} in all: split it, or store it \
+             uncompressed and as floats (np.savez)",
             untrusted_input::megabytes(bytes),
             untrusted_input::megabytes(self.size),
             untrusted_input::megabytes(untrusted_input::memory_for(self.size)),
@@ -232,7 +232,7 @@ impl NpzFile {
             return Ok(());
         }
         Err(self.content(format!(
-            "its arrays {} may name units, and are not known here: units are read from {}",
+            "its arrays {} may name units, but units are read from {} only",
             others.join(", "),
             known.join(", ")
         )))
@@ -288,7 +288,7 @@ impl NpzFile {
             (Some(count), Some(bytes)) if bytes as u64 <= stored => Ok((header, count)),
             _ => {
                 let found = format!(
-                    "of shape {:?} needs {} bytes and the archive has {stored} of it",
+                    "of shape {:?} needs {} bytes, but the archive has only {stored}",
                     header.shape,
                     bytes.map_or("too many".into(), |bytes| bytes.to_string())
                 );
@@ -502,7 +502,7 @@ pub(super) fn number_of(header: &Header) -> Option<FromBytes> {
 
 /// The text of an element without its zero padding.
 pub(super) fn letters(bytes: &[u8], header: &Header) -> Result<String, String> {
-    let damaged = || "is damaged (its text is none)".to_owned();
+    let damaged = || "is damaged (it is not text)".to_owned();
     if header.kind != 'U' {
         let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
         return Ok(std::str::from_utf8(&bytes[..end]).map_err(|_| damaged())?.into());

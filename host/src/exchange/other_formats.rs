@@ -162,7 +162,7 @@ fn said(path: &Path, first: &[u8], wanted: Contents) -> Option<String> {
     let file = |path: &Path| format!("{:?}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy());
     match (format, wanted) {
         (KnownFormat::Universal, Contents::Loop) => Some(format!(
-            "it is {name}, and a loop is read from npz: numpy.savez with the arrays of docs/own-data.md"
+            "it is {name}, but a loop is read only from npz: write one by numpy.savez with the arrays of docs/own-data.md"
         )),
         (KnownFormat::Universal, _) => None,
         (KnownFormat::Utf16, _) => Some(format!("it is {name}: save it as UTF-8 or ASCII")),

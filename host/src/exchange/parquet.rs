@@ -185,7 +185,7 @@ pub fn write_table(
         let of = |(place, (_, kind)): (usize, &(&str, Kind))| {
             values(*kind, rows.iter().map(|row| &row[place])).ok_or_else(|| ParquetFileError::Library {
                 path: path.into(),
-                what: format!("column {place} holds what it should not"),
+                what: format!("column {place} contains a value of the wrong type"),
             })
         };
         let columns: Result<Vec<Values>, _> = table.columns().iter().enumerate().map(of).collect();

@@ -149,7 +149,7 @@ impl Sheet<'_> {
 
     fn text(&self, row: usize, cells: &[SheetCell], column: &str) -> Result<String, PositionsError> {
         match self.at(cells, column)? {
-            SheetCell::Empty => Err(self.fail(row, column, "is empty, a text is needed")),
+            SheetCell::Empty => Err(self.fail(row, column, "is empty, but a text is needed")),
             SheetCell::Text(text) => Ok(text.trim().to_string()),
             SheetCell::Number(v) => Ok(v.to_string()),
         }
@@ -157,10 +157,10 @@ impl Sheet<'_> {
 
     fn number(&self, row: usize, cells: &[SheetCell], column: &str) -> Result<f64, PositionsError> {
         let value = match self.at(cells, column)? {
-            SheetCell::Empty => return Err(self.fail(row, column, "is empty, a number is needed")),
+            SheetCell::Empty => return Err(self.fail(row, column, "is empty, but a number is needed")),
             SheetCell::Number(v) => *v,
             SheetCell::Text(text) => text.trim().parse().map_err(|_| {
-                self.fail(row, column, format!("`{text}` is no number (decimal point, no unit)"))
+                self.fail(row, column, format!("`{text}` is not a number (decimal point, no unit)"))
             })?,
         };
         if value.is_finite() { Ok(value) } else { Err(self.fail(row, column, format!("is {value}"))) }
@@ -248,7 +248,7 @@ impl PositionsReader<'_> {
                         return Err(fail(
                             self.path,
                             format!(
-                                "sheet `{sheet}`: virtual point {name} stands at {position:?} m and at {:?} m; it needs one position",
+                                "sheet `{sheet}`: virtual point {name} is at {position:?} m and at {:?} m; it needs one position",
                                 point.position_m
                             ),
                         ));
@@ -334,7 +334,8 @@ pub enum GeometryFileError {
     },
     /// A position beyond the size of any rig.
     #[error(
-        "{}: `{name}` stands at {coordinate} m, and no place may be further than {FARTHEST_M} m from the origin: positions are in m, not in mm",
+        "{}: `{name}` is at {coordinate} m, and no position may be further than {FARTHEST_M} m from the origin: positions are \
+         in m, not in mm",
         path.display()
     )]
     TooFar {

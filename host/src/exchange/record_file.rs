@@ -138,7 +138,7 @@ impl Directions {
             told.extend(turned_words(&turned));
         } else if axes.iter().all(|axis| along(*axis).is_none()) {
             told.push(format!(
-                "{response}: no label can name its axes {}: the channels count in the plan's order",
+                "{response}: no label can name its axes {}: the channels are taken in the plan's order",
                 vector_names(axes)
             ));
         } else {
@@ -203,7 +203,7 @@ impl Directions {
                 Ok(turned.into_iter().collect())
             }
             Beside::Untold => Ok(vec![format!(
-                "{}: labelled {label}, and no label can name the plan's direction {planned}, which counts",
+                "{}: labelled {label}, but no label can name the plan's direction {planned}, which is used",
                 place.impact
             )]),
             Beside::Other => contradiction(),

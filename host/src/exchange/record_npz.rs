@@ -385,7 +385,7 @@ mod tests {
 
         for (units, part) in [
             (("unit_force", "mV"), "sensitivity"),
-            (("unit_response", "m/s^2"), "a velocity is wanted"),
+            (("unit_response", "m/s^2"), "a velocity is needed"),
             (("units", "mm/s"), "units are read from unit_force"),
             (("unit_force", "stone"), "`stone`"),
         ] {

@@ -16,7 +16,7 @@ use super::uff_axes::{
     Places, Sampling, Scale, UnitSystem, force_scale, motion_scale, time_scale, type_name, with_units,
 };
 use super::units::{Dimension, StatedUnits, Unit, told};
-use super::{FrfUffError, NpzError, frf_uff, labelled_frf};
+use super::{FrfUffError, NpzError, frf_file, frf_uff};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,7 +26,7 @@ use std::path::Path;
 pub enum RecordFileError {
     /// The file cannot be read, or has another program's format.
     #[error(transparent)]
-    Open(#[from] labelled_frf::FrfFileError),
+    Open(#[from] frf_file::FrfFileError),
     /// It is an npz file without impact records.
     #[error(transparent)]
     Npz(#[from] NpzError),
@@ -40,7 +40,7 @@ pub enum RecordFileError {
 /// # Errors
 /// [`RecordFileError`] with the file and what is wrong in it.
 pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile, RecordFileError> {
-    if labelled_frf::is_npz(path)? {
+    if frf_file::is_npz(path)? {
         return Ok(read_records(path, stated)?);
     }
     let contents = record_contents(path)?;
@@ -53,7 +53,7 @@ pub fn read_record_file(path: &Path, stated: &StatedUnits) -> Result<RecordFile,
 /// # Errors
 /// The file cannot be read, or has another program's format.
 pub fn record_contents(path: &Path) -> Result<Contents, RecordFileError> {
-    labelled_frf::refuse_other_formats(path, Wanted::Records)?;
+    frf_file::refuse_other_formats(path, Wanted::Records)?;
     Ok(frf_uff::contents(path)?)
 }
 
@@ -183,7 +183,7 @@ fn hits(contents: &Contents) -> Result<(Vec<HitFunctions<'_>>, Vec<String>), Str
     match (hits.is_empty(), before) {
         (false, 0) => Ok((hits, notes)),
         (false, _) => {
-            Err("a time response stands before the first force: every hit begins with its force".into())
+            Err("a time response comes before the first force: every hit begins with its force".into())
         }
         (true, 0) => {
             let why = notes.first().map_or_else(String::new, |w| format!(" ({w})"));
@@ -192,7 +192,8 @@ fn hits(contents: &Contents) -> Result<(Vec<HitFunctions<'_>>, Vec<String>), Str
             ))
         }
         (true, signals) => Err(format!(
-            "there is no force among its {signals} time responses (an ordinate of type 13): an FRF needs the hammer's force, each hit's first"
+            "there is no force among its {signals} time responses (an ordinate of type 13): an FRF needs the hammer's force, \
+             before the responses of each hit"
         )),
     }
 }
@@ -394,7 +395,7 @@ impl Timing {
         let most = whole.iter().copied().map(cut).fold(cut(0.0), f64::max);
         if most >= samples as f64 {
             return Err(format!(
-                "a response starts {:e} s from its force, which is longer than the record: they are not of one hit",
+                "a response starts {:e} s from its force, which is longer than the record: they do not belong to one hit",
                 most * step_s
             ));
         }

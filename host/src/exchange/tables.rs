@@ -63,7 +63,8 @@ impl Room {
         cell: SheetCell,
         at: impl Fn() -> String,
     ) -> Result<(), String> {
-        let of_geometry = "a geometry has a row for each channel or impact: clear what is beside its table";
+        let of_geometry =
+            "a geometry has a row for each channel or impact: clear the cells next to its table";
         if column >= MOST_COLUMNS {
             return Err(format!("{}: column {} of at most {MOST_COLUMNS}; {of_geometry}", at(), column + 1));
         }
@@ -84,7 +85,7 @@ impl Room {
 
 fn too_many_rows(at: &str) -> String {
     format!(
-        "{at}: more than {MOST_ROWS} rows; a geometry has a row for each channel or impact: clear what is below its table"
+        "{at}: more than {MOST_ROWS} rows; a geometry has a row for each channel or impact: clear the cells below its table"
     )
 }
 
@@ -124,7 +125,7 @@ pub(super) fn workbook_tables(path: &Path, wanted: &[&str]) -> Result<Tables, St
             match table.last() {
                 Some((last, _)) if *last == row => {}
                 Some((last, _)) if *last > row => {
-                    return Err(format!("{}: it stands below row {last}: save the workbook again", at()));
+                    return Err(format!("{}: it is below row {last}: save the workbook again", at()));
                 }
                 _ if table.len() >= MOST_ROWS => return Err(too_many_rows(&at())),
                 _ => table.push((row, Vec::new())),
@@ -197,7 +198,7 @@ fn csv_table(text: &str, room: &mut Room) -> Result<Table, String> {
     let wide = |line: &str| line.bytes().filter(|byte| *byte == delimiter).count() >= MOST_COLUMNS;
     if let Some(at) = text.split('\n').position(wide) {
         return Err(format!(
-            "row {}: column {} of at most {MOST_COLUMNS}; a geometry has some ten columns: clear what is beside its table",
+            "row {}: column {} of at most {MOST_COLUMNS}; a geometry has some ten columns: clear the cells next to its table",
             at + 1,
             MOST_COLUMNS + 1
         ));
@@ -296,7 +297,7 @@ pub(super) fn refuse_lies(bytes: &[u8]) -> Result<(), String> {
         part.by_ref().take(left + 1).read_to_end(&mut text).map_err(|error| of_part(&error.to_string()))?;
         left = left.checked_sub(text.len() as u64).ok_or_else(|| {
             of_part(&format!(
-                "makes its parts larger than {} in all: save the geometry's sheets as a workbook of their own",
+                "makes its parts larger than {} in all: save the geometry's sheets as a separate workbook",
                 megabytes(MOST_WORKBOOK_BYTES)
             ))
         })?;

@@ -46,7 +46,7 @@ impl UnitSystem {
             && !(same_factor(*length, *own_length) && same_factor(*force, *own_force))
         {
             return Err(format!(
-                "data set 164 contradicts itself: its code {code} stands for {names}, and its factors are {length} for length and {force} for force"
+                "data set 164 contradicts itself: its code {code} means {names}, but its factors are {length} for length and {force} for force"
             ));
         }
         let description = units.description.trim().to_owned();
@@ -133,7 +133,7 @@ impl LabelledAxis<'_> {
             let (factor, words) = match system {
                 Some(system) if !system.is_si() => (system.factor(dimension), system.words()),
                 Some(_) => (1.0, "SI by data set 164".into()),
-                None => (1.0, "SI, for want of a label".into()),
+                None => (1.0, "SI, because there is no label".into()),
             };
             return Ok(AxisUnit { factor, per_force: None, dimension, words });
         };
@@ -235,7 +235,7 @@ fn decided(
         _ if !is_told => Err(
             "the ordinate is of type 0 (unknown) and has no unit: 8 (displacement), 11 (velocity) or 12 (acceleration) is needed".into(),
         ),
-        _ => motions.iter().find(of).map(|(motion, _)| *motion).ok_or_else(|| "the ordinate is no motion".into()),
+        _ => motions.iter().find(of).map(|(motion, _)| *motion).ok_or_else(|| "the ordinate is not a motion".into()),
     }
 }
 
@@ -292,7 +292,7 @@ fn is_force(denominator: &Axis, stated: &StatedUnits) -> Result<Option<String>, 
         }
         (quantity::UNKNOWN, [0, 0 | 1, 0]) => Ok(None),
         (other, _) => Err(format!(
-            "the denominator is of type {}: an FRF here is a motion per force (type 13), and this is none (a transmissibility?)",
+            "the denominator is of type {}: an FRF here is a motion per force (type 13), and this is not one (a transmissibility?)",
             type_name(other)
         )),
     }

@@ -135,7 +135,7 @@ pub struct Unit {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UnitError {
     /// A symbol that is not in the table.
-    #[error("`{symbol}` is no unit that is known here")]
+    #[error("`{symbol}` is not a known unit")]
     Unknown {
         /// The symbol.
         symbol: String,
@@ -150,7 +150,7 @@ pub enum UnitError {
     #[error("it is not written as a unit")]
     Malformed,
     /// A unit of another dimension.
-    #[error("it is {found}, and {} is wanted", wanted.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or "))]
+    #[error("it is {found}, but {} is needed", wanted.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or "))]
     Dimension {
         /// The dimension found.
         found: Dimension,
@@ -510,7 +510,7 @@ impl FromStr for StatedUnits {
                 "force" => (&mut all.force, Unit::parse(label, &[Dimension::FORCE])),
                 "frequency" => (&mut all.frequency, Unit::of_frequency(label)),
                 "time" => (&mut all.time, Unit::parse(label, &[Dimension::TIME])),
-                _ => return Err(format!("`{name}` has no unit here: {form}")),
+                _ => return Err(format!("`{name}` cannot have a unit: {form}")),
             };
             checked.map_err(|error| format!("{name}={label}: {error}"))?;
             if place.replace(label.into()).is_some() {
@@ -655,12 +655,12 @@ mod tests {
                 said(label, force)
             );
         }
-        assert!(said("mV/V", force).contains("a force is wanted"));
+        assert!(said("mV/V", force).contains("a force is needed"));
         assert!(said("furlong", Dimension::DISPLACEMENT).contains("`furlong`"));
         assert!(said("mm/fortnight", Dimension::VELOCITY).contains("`fortnight`"));
         assert!(said("MN", force).contains("mega- or milli-"));
-        assert!(said("m/s", Dimension::ACCELERATION).contains("a velocity, and an acceleration is wanted"));
-        assert!(said("m/s", Dimension::VELOCITY.per_force()).contains("a mobility is wanted"));
+        assert!(said("m/s", Dimension::ACCELERATION).contains("a velocity, but an acceleration is needed"));
+        assert!(said("m/s", Dimension::VELOCITY.per_force()).contains("a mobility is needed"));
         for malformed in
             ["m/", "(m", "m)", "m^", "m^x", "/", "^2", "m//s", "m^99", "3 m", "m.", "((((((((((m))))))))))"]
         {

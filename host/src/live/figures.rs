@@ -102,7 +102,7 @@ pub fn shaker(now: &Shaker) -> Option<Figure> {
         time(),
         Axis::linear(quantity, unit, [0.0, top(&held, if ordered { 1.1 * order } else { 1e-9 })]),
     )
-    .titled("amplitude of what is held");
+    .titled("controlled amplitude");
     if ordered {
         amplitude = amplitude.with(Mark::level(Role::Guide, order).named("order"));
     }
@@ -116,7 +116,7 @@ pub fn shaker(now: &Shaker) -> Option<Figure> {
         "shaker-now",
         "",
         now.title.clone(),
-        "Amplitude of every window of some whole cycles, the drive that brings it about, and the last cycle as a loop, raw.",
+        "Amplitude of each window of a few whole cycles, the drive that produces it, and the last cycle as a raw loop.",
     )
     .across(3)
     .with(amplitude)
@@ -130,7 +130,7 @@ pub fn shaker(now: &Shaker) -> Option<Figure> {
             Axis::linear("relative displacement", "µm", reach(x)),
             Axis::linear("force", "N", reach(force)),
         )
-        .titled("the loop as it turns")
+        .titled("the latest loop")
         .high(Height::Square);
         panel = panel.with(Mark::looped(Role::Loops, x.iter().copied(), force.iter().copied()));
         figure = figure.with(panel);
@@ -153,7 +153,7 @@ pub fn channels(store: &Store, record: i64) -> Result<Option<Figure>, StoreError
         "channels",
         "",
         format!("Every channel of record {record}"),
-        "Least and largest value of each short stretch, in the unit of the channel.",
+        "Smallest and largest value of each short stretch, in the unit of the channel.",
     )
     .across(2);
     for (place, channel) in map.channels.iter().enumerate() {

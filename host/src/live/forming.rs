@@ -52,7 +52,7 @@ pub fn form(path: &Path, bus: &Bus, formed: &Formed, stop: &AtomicBool) {
         let newest = match newest(path) {
             Ok(newest) => newest,
             Err(error) => {
-                log::debug!("the page's estimate waits: {error}");
+                log::debug!("the page's estimate is delayed: {error}");
                 continue;
             }
         };

@@ -307,7 +307,7 @@ mod tests {
             "A2:z 0.81",
             "N m/rad",
             "not identified",
-            "Hits drawn anew 500 times",
+            "Hits resampled 500 times",
         ] {
             assert!(html.contains(text), "`{text}` is not on the page");
         }

@@ -276,7 +276,7 @@ fn soft_tips_give_the_exact_frf_and_long_records_are_used_whole() {
         .expect("written");
     done(folder, &["campaign", "new", "c.jrig", "--plan", "plan.toml"]);
     let told = done(folder, &[&["import", "hits.npz"], &CELL[..]].concat());
-    assert!(told.contains("the plan's length_s is 1 s: they are used whole"), "{told}");
+    assert!(told.contains("the plan's length_s is 1 s: they are used in full"), "{told}");
     done(folder, &["export", "c.jrig", "--format", "npz", "--out", "x"]);
     let frf = read_frf(&folder.join("x/frf/A.npz")).expect("exported");
     let most = frf.lines().iter().map(|line| line[(0, 0)].norm()).fold(0.0, f64::max);

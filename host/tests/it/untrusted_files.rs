@@ -268,7 +268,7 @@ fn a_matrix_that_is_mostly_holes_is_not_made() {
     };
     let text = (0..3000).map(set).collect::<Vec<_>>().concat();
     std::fs::write(folder.path().join("holes.uff"), text).expect("written");
-    refused(folder.path(), DOORS[0], "holes.uff", &["mostly holes"]);
+    refused(folder.path(), DOORS[0], "holes.uff", &["mostly empty"]);
 }
 
 /// A campaign with three hits, and FRFs.

@@ -112,5 +112,5 @@ fn hits_drawn_anew_scatter_as_the_noise_does() {
     // of per cent
     let ratio = drawn.hits[&Dof::Z].std / propagated;
     assert!((0.6..1.6).contains(&ratio), "{:?} against {propagated:e}", drawn.hits[&Dof::Z]);
-    assert!(words::summary(&results).join("\n").contains("Hits drawn anew 100 times"));
+    assert!(words::summary(&results).join("\n").contains("Hits resampled 100 times"));
 }

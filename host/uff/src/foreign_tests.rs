@@ -152,7 +152,7 @@ fn what_cannot_be_read_is_named_and_the_rest_is_read() {
     let (first, second) = (&read.faults[0], &read.faults[1]);
     assert_eq!((first.place, first.data_set), (2, 58));
     assert!(bytes[first.offset..].starts_with(b"0.00000*"), "{first}");
-    assert!(first.to_string().contains("is no number"), "{first}");
+    assert!(first.to_string().contains("is not a number"), "{first}");
     assert!(second.reason.contains("IEEE"), "{second}");
 }
 

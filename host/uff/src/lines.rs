@@ -207,7 +207,7 @@ impl<'a> Words<'a> {
         number::parse(word).ok_or_else(|| Wrong {
             offset,
             reason: format!(
-                "`{}` is no number, {what} is expected",
+                "`{}` is not a number, but {what} is expected",
                 String::from_utf8_lossy(shortened(word, 40))
             ),
         })

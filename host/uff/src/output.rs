@@ -32,7 +32,7 @@ impl Output {
     pub fn label(&mut self, what: &str, text: &str) -> Result<(), String> {
         let line = label(what, text, 80)?;
         if is_delimiter(line.as_bytes()) {
-            return Err(format!("{what} is `{text}`, which would end the data set: say it in words"));
+            return Err(format!("{what} is `{text}`, which would end the data set: use another text"));
         }
         self.line(&line);
         Ok(())
@@ -46,7 +46,7 @@ pub(super) fn label(what: &str, text: &str, width: usize) -> Result<String, Stri
         return Err(format!("{what} `{text}` is longer than {width} characters: shorten it"));
     }
     if text.chars().any(char::is_control) {
-        return Err(format!("{what} {text:?} has a control character: take it out"));
+        return Err(format!("{what} {text:?} has a control character: remove it"));
     }
     Ok(format!("{text:<width$}"))
 }

@@ -34,7 +34,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<Header, Wrong> {
     let fourth = lines.text("the date of the database")?;
     let [date, time, first, second, kind] = fourth.columns([10; 5]);
     let number = |field: &str| {
-        integer(field).ok_or_else(|| fourth.wrong(format!("`{field}` is no version number or file type")))
+        integer(field).ok_or_else(|| fourth.wrong(format!("`{field}` is not a version number or file type")))
     };
     let versions = [number(&first)?, number(&second)?];
     let file_type = number(&kind)?;

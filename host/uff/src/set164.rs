@@ -42,7 +42,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<Units, Wrong> {
     let first = lines.text("the units' code")?;
     let [code, description, mode] = first.columns([10, 20, 10]);
     let number =
-        |field: &str| integer(field).ok_or_else(|| first.wrong(format!("`{field}` is no whole number")));
+        |field: &str| integer(field).ok_or_else(|| first.wrong(format!("`{field}` is not a whole number")));
     let (code, temperature_mode) = (number(&code)?, number(&mode)?);
     let mut words = Words::new(lines);
     Ok(Units {

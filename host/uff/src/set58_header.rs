@@ -97,7 +97,7 @@ pub(super) fn axis(record: &Record<'_>) -> Result<Axis, Wrong> {
     let [quantity, length, force, temperature, label, unit] = record.columns([10, 5, 5, 5, 21, 21]);
     let number = |field: &str| {
         integer(field).ok_or_else(|| {
-            record.wrong(format!("`{field}` is no whole number in a line of I10,3I5,2(1X,20A1)"))
+            record.wrong(format!("`{field}` is not a whole number in a line of I10,3I5,2(1X,20A1)"))
         })
     };
     Ok(Axis {

@@ -67,7 +67,7 @@ pub(super) fn read_binary(
     };
     if let Some(format) = words.next().filter(|format| !["2", "0"].contains(format)) {
         return Err(wrong(format!(
-            "the floats are of format `{format}`: 2 (IEEE 754) is known, write the file so"
+            "the floats are of format `{format}`: only 2 (IEEE 754) is known, write the file in it"
         )));
     }
     let fitting = widths(shape).into_iter().find(|w| bytes_for(shape, *w) == Some(data.bytes.len()));
@@ -107,7 +107,7 @@ pub(super) fn read_text(lines: Lines<'_>, shape: &ValueShape) -> Result<(Absciss
     let wanted = shape.points.checked_mul(shape.numbers());
     let wrong = |there: &str| {
         let reason =
-            format!("{} values of {} numbers each are announced and {there}", shape.points, shape.numbers());
+            format!("{} values of {} numbers each are announced, but {there}", shape.points, shape.numbers());
         Wrong { offset: start, reason }
     };
     let there = lines.rest().len();

@@ -32,7 +32,7 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<TraceLine, Wrong> {
     }
     // more than stated is common (one writer counts each node once); fewer means that some are lost
     if number::count(nodes.len()) < count {
-        return Err(first.wrong(format!("{count} nodes are announced and {} are there", nodes.len())));
+        return Err(first.wrong(format!("{count} nodes are announced, but {} are there", nodes.len())));
     }
     Ok(TraceLine { number: line, color, name, nodes })
 }

@@ -8,7 +8,7 @@ use std::io;
 use std::time::Duration;
 
 use jointrig::device::session::Session;
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 use jointrig_protocol::answer::{self, Answer, Counters, Hammer, Info, Reset, Shaker, Status};
 use jointrig_protocol::block::Header;
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};

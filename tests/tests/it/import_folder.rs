@@ -84,7 +84,7 @@ fn what_was_exported_is_imported_again_by_names_or_labels() {
     done(&mut import(&at("daq"), &by_label, &[]));
     assert_eq!(kept(&by_label), kept(&measured));
     assert_eq!(records(&by_label), first);
-    assert!(done(jointrig().args(["campaign", "verify", "--deep"]).arg(&by_label)).contains("all whole"));
+    assert!(done(jointrig().args(["campaign", "verify", "--deep"]).arg(&by_label)).contains("all intact"));
 }
 
 /// Writes three hits with three axes to a file of this name.

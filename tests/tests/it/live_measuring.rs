@@ -277,9 +277,9 @@ fn a_page_ends_measuring_after_the_shot_in_hand() {
     let mut server = Served::beside(&mut command);
     std::thread::sleep(Duration::from_secs(1));
     let (code, said) = server.wanted("/api/stop", server.edit_token(), &[], "{}");
-    assert!(code == 200 && said.contains("no emergency stop"), "{code} {said}");
+    assert!(code == 200 && said.contains("not an emergency stop"), "{code} {said}");
     let (status, rest) = server.wait();
-    assert!(!status.success() && rest.contains("goes on from here"), "{rest}");
+    assert!(!status.success() && rest.contains("continues from here"), "{rest}");
     assert_eq!(Store::open_read_only(&file).unwrap().verify().unwrap(), []);
 }
 

@@ -57,7 +57,7 @@ fn verdicts_and_amplitudes_follow_from_the_codes_whatever_a_person_did_since() {
     let (whole, said) = deep(&file);
     assert!(whole, "{said}");
     let told = format!("the verdicts of {} records and 1 levels follow", records.len());
-    assert!(said.contains("all whole") && said.contains(&told), "{said}");
+    assert!(said.contains("all intact") && said.contains(&told), "{said}");
 }
 
 #[test]
@@ -111,10 +111,10 @@ fn a_verdict_that_does_not_follow_is_named_although_every_seal_fits() {
     };
     store.insert_level(&false_level).unwrap();
     store.close().unwrap();
-    assert!(done(jointrig().args(["campaign", "verify"]).arg(&file)).contains("all whole"));
+    assert!(done(jointrig().args(["campaign", "verify"]).arg(&file)).contains("all intact"));
     let (whole, said) = deep(&file);
     assert!(!whole && said.contains("3 of ") && said.contains("differ"), "{said}");
-    for part in ["`double hit`", "in the file, and `good`", "level 2:"] {
+    for part in ["`double hit`", "in the file, but `good`", "level 2:"] {
         assert!(said.contains(part), "{part}: {said}");
     }
 }

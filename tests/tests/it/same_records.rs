@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::device::address::Address;
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 use jointrig_tests::campaign::{Kept, plan, run};
 use jointrig_tests::command::Served;
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::{ContactLaw, SimulatedRig};
 use jointrig::device::address::Address;
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 use jointrig_hil_sim::board::VirtualBoard;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::serve;

@@ -6,11 +6,11 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use jointrig::campaign::run::runner::RunError;
+use jointrig::campaign::run::error::RunError;
 use jointrig::campaign::run::runner::Summary;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::session_table::{ClockRow, EdgeRow};
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 use jointrig_hil_sim::board::{Options as BoardOptions, VirtualBoard, Wires};
 use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;

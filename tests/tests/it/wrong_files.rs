@@ -78,7 +78,7 @@ fn a_campaign_that_is_copied_while_it_is_measured_lacks_its_last_records_and_ver
     assert_eq!(out.status.code(), Some(1));
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
     assert!(
-        text.contains("copied.jrig-wal is not beside it") && text.contains("jointrig campaign backup"),
+        text.contains("copied.jrig-wal is not next to it") && text.contains("jointrig campaign backup"),
         "{text}"
     );
     for file in [&file, &whole] {

@@ -5,9 +5,7 @@ use core::task::Poll;
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::String;
-use jointrig_firmware::ad7606b::alignment::Alignment;
-use jointrig_firmware::ad7606b::reader::Reader;
-use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::ad7606b::reader::{Alignment, Reader, Trouble};
 use jointrig_firmware::board::{self, Delivered, RanDry, Seen};
 use jointrig_firmware::lockstep::{
     BLOCK_AT, CLOCK, DELIVERY_BYTES, DRIVE_AT, DRIVE_FULL_SCALE_V, Delivery, EMERGENCY_STOP, HELD,

@@ -14,7 +14,7 @@ use embassy_stm32::pac::gpio::vals::Idr;
 use embassy_stm32::peripherals::{PF12, PF13, PF14, PF15};
 use embassy_time::Instant;
 use jointrig_firmware::board::Inputs;
-use jointrig_firmware::relay::{Fault, Relay};
+use jointrig_firmware::safety::{Relay, RelayFault};
 use jointrig_protocol::slow::Slow;
 
 /// Whether K1 was seen to follow its coil; must be checked together with the guard's pin.
@@ -43,8 +43,8 @@ pub struct Switches {
     key_was_on: bool,
     dropped: Input<'static>,
     relay: Relay,
-    told: Option<Fault>,
-    to_tell: Option<Fault>,
+    told: Option<RelayFault>,
+    to_tell: Option<RelayFault>,
 }
 
 impl Switches {
@@ -83,7 +83,7 @@ impl Inputs for Switches {
     }
 
     fn fault(&mut self) -> Option<&'static str> {
-        self.to_tell.take().map(Fault::sentence)
+        self.to_tell.take().map(RelayFault::sentence)
     }
 
     fn slow(&mut self) -> Option<Slow> {

@@ -24,7 +24,7 @@ use embassy_stm32::pac::spi::Spi;
 use embassy_stm32::pac::spi::vals::{Comm, Cpha, Cpol, Fthlv, Master, Mbr, Ssom, Trigpol};
 use embassy_stm32::pac::{EXTI, GPDMA1, SPI1, SPI2};
 use embassy_sync::waitqueue::AtomicWaker;
-use jointrig_firmware::ad7606b::alignment::SCAN_WORDS;
+use jointrig_firmware::ad7606b::reader::SCAN_WORDS;
 use jointrig_hot::pair::CHIP_BYTES;
 
 use crate::dma::{self, Carries};

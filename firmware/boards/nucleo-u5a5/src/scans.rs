@@ -18,10 +18,8 @@ use embassy_stm32::timer::low_level::{
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Channel};
 use embassy_time::{Duration, Timer, with_timeout};
-use jointrig_firmware::ad7606b::alignment::{Alignment, Clock, Moment};
 use jointrig_firmware::ad7606b::part::AD7606B;
-use jointrig_firmware::ad7606b::reader::Reader;
-use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::ad7606b::reader::{Alignment, Clock, Moment, Reader, Trouble};
 use jointrig_firmware::board::{Delivered, Scans, Seen};
 use jointrig_firmware::ruler::Ago;
 use jointrig_firmware::sentence::{Sentence, Tell};

@@ -11,7 +11,7 @@ use critical_section::Mutex;
 use embassy_stm32::Peri;
 use embassy_stm32::peripherals::{ADC1, PC0, PC1, PC2, PC3};
 use embassy_time::Timer;
-use jointrig_firmware::slow::pt1000_c;
+use jointrig_firmware::supplies::pt1000_c;
 use jointrig_protocol::slow::{Slow, Supply};
 
 use crate::adc::Adc;

@@ -2,7 +2,7 @@
 //! its count of periods, the BUSY signal of each chip, an SPI port that must be disabled and
 //! enabled between two transfers, and a DMA channel that writes its ring.
 
-use jointrig_firmware::ad7606b::alignment::{Clock, Moment, SCAN_WORDS};
+use jointrig_firmware::ad7606b::reader::{Clock, Moment, SCAN_WORDS};
 use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc};
 
 /// Counts of the timer in a period, as on the board: 160 MHz / 51 200 Hz.

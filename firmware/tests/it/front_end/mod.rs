@@ -7,9 +7,7 @@ mod noise;
 mod timing;
 
 use hardware::{BLOCK_SCANS, BLOCKS, CLOCK, Hardware, PERIOD, Slip};
-use jointrig_firmware::ad7606b::alignment::{Alignment, Moment, Verdict};
-use jointrig_firmware::ad7606b::reader::Reader;
-use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::ad7606b::reader::{Alignment, Moment, Reader, Trouble, Verdict};
 
 const CHANNELS: usize = 16;
 

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use jointrig_firmware::ad7606b::trouble::Trouble;
+use jointrig_firmware::ad7606b::reader::Trouble;
 use jointrig_firmware::lockstep::NEVER;
 
 use super::front_end::Slip;

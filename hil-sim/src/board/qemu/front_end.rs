@@ -1,7 +1,7 @@
 //! The two converters of an emulated board and the rings that they are read into, as hardware would
 //! fill them.
 
-use jointrig_firmware::ad7606b::alignment::{Moment, SCAN_WORDS};
+use jointrig_firmware::ad7606b::reader::{Moment, SCAN_WORDS};
 use jointrig_firmware::lockstep::{CLOCK, Delivery, RING_BLOCKS};
 use jointrig_hot::pair::{CHANNELS, CHIP_BYTES, data_crc};
 

@@ -126,7 +126,7 @@ impl QemuBoard {
             Ok(()) => Ok((board, host)),
             Err(RecvTimeoutError::Timeout) => {
                 board.emulator.kill();
-                Err(QemuError::Start(format!("it said nothing for {} s", START_LIMIT.as_secs())))
+                Err(QemuError::Start(format!("it sent nothing for {} s", START_LIMIT.as_secs())))
             }
             Err(RecvTimeoutError::Disconnected) => {
                 let sentence = board.failure().unwrap_or_else(|| "its thread panicked".into());

@@ -136,10 +136,10 @@ impl Server {
         let ask = self.wait()?;
         self.ram.forget_name();
         if Op::from_word(ask.op) != Some(Op::Start) {
-            return Err("it does not begin as this simulator's firmware does: build both anew".into());
+            return Err("it does not begin as this simulator's firmware does: rebuild both".into());
         }
         if ask.argument != schema::HASH as u32 {
-            return Err("its protocol differs from this simulator's: build both anew".into());
+            return Err("its protocol differs from this simulator's: rebuild both".into());
         }
         self.put_text(&self.setup.clone())?;
         self.set_inputs();
@@ -181,7 +181,7 @@ impl Server {
                 Some(Op::Stage) => self.go(ask.argument)?,
                 Some(Op::Panic) => {
                     let text = self.ram.text(ask.argument).map_err(|error| broken(&error))?;
-                    return Err(format!("the firmware broke down: {}", String::from_utf8_lossy(&text)));
+                    return Err(format!("the firmware failed: {}", String::from_utf8_lossy(&text)));
                 }
                 Some(Op::Start) | None => {
                     return Err(format!("the firmware asks for something unknown ({})", ask.op));
@@ -239,7 +239,7 @@ impl Server {
         let block_us = self.faults.delivered_at(ask.block_us, self.setup.scan_rate_hz, self.per_block);
         let next = ask.alarm_us.min(block_us);
         if next == NEVER {
-            return Err(io::Error::other("the board waits for something that cannot come: no alarm is set"));
+            return Err(io::Error::other("the board waits forever: no alarm is set"));
         }
         self.reply.now_us = self.reply.now_us.max(next);
         if block_us <= self.reply.now_us {
@@ -366,7 +366,7 @@ impl Server {
     fn go(&mut self, length: u32) -> Result<(), Ended> {
         let text = self.ram.text(length).map_err(|error| broken(&error))?;
         let place: request::Stage = from_text(&text)
-            .ok_or("the firmware's stage order is unreadable: build image and simulator anew")?;
+            .ok_or("the firmware's stage order is unreadable: rebuild image and simulator")?;
         if let Err(refusal) = self.stage.go(&place) {
             self.put_text(&refusal)?;
         }

@@ -81,7 +81,7 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
     channels.extend(config.sensors.fixed.iter().map(|own| own.name.clone()));
     for (name, volts) in &errors.volts {
         if !channels.contains(name) {
-            return Err(bad(&format!("errors.volts.{name}"), "is no channel of the rig"));
+            return Err(bad(&format!("errors.volts.{name}"), "is not a channel of the rig"));
         }
         if !volts.is_finite() || *volts == 0.0 {
             return Err(bad(&format!("errors.volts.{name}"), "must be a number, and not zero"));
@@ -117,8 +117,9 @@ fn contact(config: &RigConfig) -> Result<(), RigError> {
     if let Some(soft) =
         contact.stiffness_n_per_m.iter().find(|k| (f64::MIN_POSITIVE..SOFTEST_N_PER_M).contains(*k))
     {
-        let reason =
-            format!("is {soft} N/m, softer than any contact of solids: it is in N/m, 180e6 for 180 N/µm");
+        let reason = format!(
+            "is {soft} N/m, softer than any contact between solids: the unit is N/m, 180e6 for 180 N/µm"
+        );
         return Err(bad("contact.stiffness_n_per_m", &reason));
     }
     not_negative("contact.friction_coefficient", contact.friction_coefficient)?;
@@ -310,7 +311,7 @@ pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
         if !config.responses.iter().any(|point| point.name == own.response) {
             return Err(bad(
                 &field("response"),
-                &format!("`{}` is none of the rig's responses", own.response),
+                &format!("`{}` is not one of the rig's responses", own.response),
             ));
         }
         finite(&field("direction"), &own.direction)?;

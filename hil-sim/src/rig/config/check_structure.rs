@@ -16,7 +16,7 @@ fn bodies_and_springs(own: &OwnStructure) -> Result<(), RigError> {
         if it.name.as_str() == "ground" {
             return Err(bad(
                 &format!("{field}.name"),
-                "is ground, which holds the springs that no body does",
+                "is ground, the reserved name of the fixed end of a spring",
             ));
         }
         if own.bodies[..index].iter().any(|earlier| earlier.name == it.name) {
@@ -80,6 +80,6 @@ fn points(config: &RigConfig, own: &OwnStructure) -> Result<(), RigError> {
 fn known<'o>(own: &'o OwnStructure, field: &str, name: BodyName) -> Result<&'o OwnBody, RigError> {
     own.body(name).ok_or_else(|| {
         let names: Vec<&str> = own.bodies.iter().map(|body| body.name.as_str()).collect();
-        bad(field, &format!("names {name}, which is no body of [structure]: {}", names.join(", ")))
+        bad(field, &format!("names {name}, which is not a body of [structure]: {}", names.join(", ")))
     })
 }

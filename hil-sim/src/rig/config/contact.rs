@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Bushing;
-use crate::rig::structure::normalized;
+use crate::rig::unit_vector::normalized;
 
 /// The law of the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

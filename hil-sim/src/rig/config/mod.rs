@@ -3,28 +3,31 @@
 //! `rigs/default.toml` is the built-in default and defines every default value;
 //! [`RigConfig::default`] reads the embedded copy. A user's file states any subset: its tables
 //! merge into the default's, its lists replace the default's lists.
-//!
-//! Surroundings of the structure: the specimen's temperature, and the cables of the sensors with
-//! constant-current supplies.
-
-use super::Configuration;
-use super::error::RigError;
-use serde::{Deserialize, Serialize};
-
-pub use super::body::{BodyName, OwnName};
-pub(crate) use check::normal_load;
-pub use contact::{Contact, ContactLaw, Iwan};
-pub use document::{Errors, OwnBody, OwnStructure, Side, Spring};
-pub use sensors::{
-    Excitation, FixedVibrometer, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer,
-};
 
 mod check;
 mod check_structure;
 mod contact;
 mod document;
+mod errors;
+mod own_structure;
 mod sensors;
+mod surroundings;
 mod values;
+
+pub use super::body::{BodyName, OwnName};
+pub(crate) use check::normal_load;
+pub use contact::{Contact, ContactLaw, Iwan};
+pub use errors::Errors;
+pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
+pub use sensors::{
+    Excitation, FixedVibrometer, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer,
+};
+pub use surroundings::{Cable, Surroundings};
+
+use serde::{Deserialize, Serialize};
+
+use super::Configuration;
+use super::error::RigError;
 
 /// The built-in default rig, as text.
 pub const DEFAULT_TOML: &str = include_str!("../../../rigs/default.toml");
@@ -335,44 +338,4 @@ pub struct Mishaps {
     pub overload: f64,
     /// Ratio of its peak to an undisturbed one.
     pub overload_factor: [f64; 2],
-}
-
-/// Surroundings of the structure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Surroundings {
-    /// Temperature of the specimen at the start (°C).
-    pub temperature_c: f64,
-    /// Rate at which it rises (K/s).
-    pub warming_k_per_s: f64,
-    /// State of the cable of the hammer's force cell.
-    pub force_cable: Cable,
-    /// State of the cable of the shaker's force cell.
-    pub excitation_cable: Cable,
-}
-
-/// What a constant-current supply detects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cable {
-    /// A sensor.
-    Sensor,
-    /// An open circuit.
-    Open,
-    /// A short circuit.
-    Short,
-}
-
-impl Cable {
-    /// Mean voltage at the socket (V): for a sensor the middle of the usual bias range, for an open
-    /// socket the voltage of a 24 V supply behind its current source, for a short the voltage drop
-    /// of the wire.
-    #[must_use]
-    pub fn bias_v(self) -> f32 {
-        match self {
-            Self::Sensor => 11.0,
-            Self::Open => 22.5,
-            Self::Short => 0.1,
-        }
-    }
 }

@@ -5,13 +5,12 @@
 //! full covariance (generalised least squares). What they share is known: each is a sum over the
 //! parameters of the hits' fit plus an independent part. No weight is negative: for readings with
 //! nearly the same errors, negative weights would trust the covariance more than it deserves.
-//!
-//! One reading of the contact's compliance: its value and its uncertainties.
 
 use super::driven::REACH_HZ;
 use super::levels::LevelStiffness;
 use super::outcome::{Interval, Variances, stiffness_of};
 use super::parameters::{COMPLIANCE, Cause};
+use super::reading::{Reading, unit};
 use super::{Known, Stiffness};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -100,40 +99,6 @@ fn weights(covariance: &DMatrix<f64>) -> Option<Vec<f64>> {
         }
         kept.remove(least);
     }
-}
-
-/// A level's compliance, its dependence on the parameters of the hits' fit, and its other
-/// uncertainties.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Reading {
-    /// The level's frequency, Hz.
-    pub frequency_hz: f64,
-    /// 1/k_T, m/N.
-    pub compliance: f64,
-    /// Its derivatives by the parameters.
-    pub row: DVector<f64>,
-    /// Variance of the motions per newton at this frequency.
-    pub turning: f64,
-    /// Variance due to where the shaker pushes.
-    pub place: f64,
-    /// Variance due to the scatter of the level itself.
-    pub level: f64,
-}
-
-/// Difference between a level's compliance and that of the hits, in standard deviations of the
-/// difference.
-pub fn apart(known: &Known, reading: &Reading) -> f64 {
-    let difference = &reading.row - unit(known);
-    let own = reading.turning + reading.place + reading.level;
-    let variance = known.of_sum(&difference).values().sum::<f64>() + own;
-    (reading.compliance - known.p[COMPLIANCE]) / variance.sqrt()
-}
-
-/// The derivatives of the hits' own reading, which is the parameter itself.
-pub fn unit(known: &Known) -> DVector<f64> {
-    let mut unit = DVector::zeros(known.p.len());
-    unit[COMPLIANCE] = 1.0;
-    unit
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@
 
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
-use super::joint::{Reading, apart};
 use super::outcome::Interval;
 use super::parameters::{DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
+use super::reading::{Reading, apart};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N};
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;
@@ -86,24 +86,26 @@ pub struct LevelStiffness {
 #[non_exhaustive]
 pub enum LevelError {
     /// Its frequency is outside the band in which the bodies are rigid and the hits have data.
-    #[error("its frequency is outside {low:.0}–{high:.0} Hz, where the contact is read", low = BAND.low_hz, high = BAND.high_hz)]
+    #[error("its frequency is outside {low:.0}–{high:.0} Hz, the band in which k_T can be determined", low = BAND.low_hz, high = BAND.high_hz)]
     OutOfBand,
     /// No impact drives the contact.
-    #[error("no impact along z on the moving mass (grouping 3) says where the shaker pushes")]
+    #[error(
+        "there is no impact along z on the moving mass (grouping 3), which is needed to know where the shaker pushes"
+    )]
     NoImpact,
     /// The hits have no lines around its frequency.
     #[error("the hits have no usable lines around its frequency")]
     NoLines,
     /// The effect of the shaker's position matters, and its size is unknown.
     #[error(
-        "what a tilt of the hammer does is not known: hit A along z at three places that are not in a line"
+        "the effect of a tilt of the hammer is not known: hit A along z at three places that are not in a line"
     )]
     NoPlace,
     /// A single stretch has no scatter.
-    #[error("its record is too short: its scatter is not known")]
+    #[error("its record is too short to estimate its scatter")]
     Short,
     /// The compliance cannot be distinguished from zero.
-    #[error("the specimens' rotation makes so much of Δx here that nothing is known of the contact")]
+    #[error("most of Δx at this frequency comes from the specimens' rotation, so k_T cannot be determined")]
     NotIdentified,
     /// The spectra do not belong together.
     #[error(transparent)]

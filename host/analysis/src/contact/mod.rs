@@ -36,6 +36,7 @@ mod block;
 mod cell;
 mod diagnosis;
 mod driven;
+mod form_scale;
 mod joint;
 mod levels;
 #[cfg(test)]
@@ -44,9 +45,11 @@ mod line;
 mod model;
 mod outcome;
 mod parameters;
+mod reading;
 mod solver;
 #[cfg(test)]
 mod tests;
+mod unexplained;
 
 pub use cell::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, SignalResidual};
@@ -99,7 +102,7 @@ pub struct Input<'a> {
 pub enum ContactError {
     /// No usable cell.
     #[error(
-        "no cell shows the contact: hits along z on the assembly are needed, with load cells and both spots"
+        "no cell has the signals of the contact: hits along z on the assembly are needed, with load cells and both spots"
     )]
     NoCells,
     /// The impacts that calibrate the force are missing.
@@ -109,25 +112,25 @@ pub enum ContactError {
     NoForce,
     /// The points that determine the specimen's rotation are missing.
     #[error(
-        "the specimen's rotation is not known: its tilt between contact and spot cannot be told from the contact's own compliance. Measure three points \
+        "the specimen's rotation is not known: its tilt between contact and spot cannot be distinguished from the contact's own compliance. Measure three points \
          or more on specimen A (grouping 5) in the assembly, with three of arm B's interface (grouping 2), from hits along z on A or on the moving mass"
     )]
     NoRotation,
     /// The positions of the spots are missing.
     #[error(
-        "the plan does not say where the vibrometers beside the contact look: give the sensors LDV_A and LDV_B in [geometry]"
+        "the plan does not state where the vibrometers next to the contact point: give the sensors LDV_A and LDV_B in [geometry]"
     )]
     NoSpots,
     /// A single hit does not determine its noise.
     #[error(
-        "every cell of {impact} has a single hit, so that the noise is not known: keep two or more in some"
+        "every cell of {impact} has a single hit, so the noise is not known: keep two or more hits in some of them"
     )]
     SingleHits {
         /// The impact.
         impact: String,
     },
     /// Spectra that do not belong together.
-    #[error("cell {impact} × {point} has other lines or channels than the rest")]
+    #[error("the lines or channels of cell {impact} × {point} differ from those of the other cells")]
     Unlike {
         /// The impact.
         impact: String,
@@ -142,7 +145,7 @@ pub enum ContactError {
 impl ContactError {
     /// The hits on B alone do not determine the force.
     fn no_force() -> Self {
-        ContactError::NotIdentified("the hits do not tell the force at the contact".into())
+        ContactError::NotIdentified("the force at the contact cannot be determined from the hits".into())
     }
 }
 
@@ -225,10 +228,10 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         blocks.iter().filter(|block| block.along_z.is_none()).map(|block| block.lines.len()).sum();
     if lines < FEWEST_LINES {
         return Err(ContactError::NotIdentified(format!(
-            "only {lines} lines of the hits on the assembly are numbers with a known noise in every cell"
+            "only {lines} lines of the hits on the assembly have valid values and a known noise in every cell"
         )));
     }
-    parameters::scale_form(&mut parameters, &blocks);
+    form_scale::scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })

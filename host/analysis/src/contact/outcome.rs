@@ -158,11 +158,11 @@ pub fn stiffness_of(
         let stiffest = compliance + half;
         return Err(ContactError::NotIdentified(if stiffest > 0.0 {
             format!(
-                "the contact is too stiff to be told from a rigid one: k_T is above {:.0} N/µm",
+                "the contact is too stiff to be distinguished from a rigid one: k_T is above {:.0} N/µm",
                 1e-6 / stiffest
             )
         } else {
-            "the compliance comes out negative".into()
+            "the estimated compliance is negative".into()
         }));
     }
     let ci95 = [1.0 / (compliance + half), 1.0 / (compliance - half)];

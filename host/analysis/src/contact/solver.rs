@@ -8,7 +8,7 @@
 use super::block::Block;
 use super::line::{Normal, Residual};
 use super::parameters::{COMPLIANCE, Parameters};
-use super::{ContactError, diagnosis};
+use super::{ContactError, unexplained};
 use crate::errors_in_variables::NoiseInflation;
 use crate::frf::noise::shared_by_lines;
 use crate::parallel::prelude::*;
@@ -80,13 +80,13 @@ pub fn solve(
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
             .collect();
-        if !diagnosis::widen(blocks, &left) {
+        if !unexplained::widen(blocks, &left) {
             break;
         }
         (here, settled) = Posterior { blocks, parameters, shared }.settle(here.p)?;
     }
     if !settled {
-        return Err(ContactError::NotIdentified("the fit of the contact does not settle".into()));
+        return Err(ContactError::NotIdentified("the fit of the contact does not converge".into()));
     }
     let (information, _) = Posterior { blocks, parameters, shared }.normal(&here);
     let certainty = certainty(blocks, &here.bins, &here.p, &information, shared)?;
@@ -301,7 +301,7 @@ pub fn evaluate(blocks: &[Block], p: &[f64], before: Option<&Motion>) -> Result<
     let bins: Vec<Option<Bin>> =
         tasks.into_par_iter().map(|(b, lines)| bin(blocks, b, lines, p, before)).collect();
     bins.into_iter().collect::<Option<Vec<Bin>>>().ok_or_else(|| {
-        ContactError::NotIdentified("the points do not tell how arm B and specimen A move".into())
+        ContactError::NotIdentified("the points do not determine the motion of arm B and specimen A".into())
     })
 }
 

@@ -449,10 +449,10 @@ pub enum FrfError {
         frequency_hz: f64,
     },
     /// The damping of the exponential window is not a finite number.
-    #[error("the exponential window's damping is {0} 1/s: a finite number that is not negative is needed")]
+    #[error("the exponential window's damping is {0} 1/s: it must be finite and not negative")]
     Damping(f64),
     /// A name occurs twice among the outputs or the inputs.
-    #[error("the name `{name}` stands twice among the {side}: rename one of them")]
+    #[error("the name `{name}` occurs twice among the {side}: rename one of them")]
     RepeatedName {
         /// `outputs` or `inputs`.
         side: &'static str,
@@ -471,7 +471,7 @@ pub enum FrfError {
     },
     /// A value is NaN or infinite.
     #[error(
-        "the FRF from `{input}` to `{output}` is not a number at {frequency_hz} Hz: repeat that cell or cut the line out"
+        "the FRF from `{input}` to `{output}` is not a number at {frequency_hz} Hz: measure that cell again or remove the line"
     )]
     NotFinite {
         /// The row's name.
@@ -483,7 +483,7 @@ pub enum FrfError {
     },
     /// A variance is below zero.
     #[error(
-        "the variance of the FRF from `{input}` to `{output}` is {variance} at {frequency_hz} Hz: a variance is zero or more, NaN where it is not known"
+        "the variance of the FRF from `{input}` to `{output}` is {variance} at {frequency_hz} Hz: a variance must be zero or more, or NaN if it is not known"
     )]
     NegativeVariance {
         /// The row's name.
@@ -497,7 +497,8 @@ pub enum FrfError {
     },
     /// A coherence is not between 0 and 1.
     #[error(
-        "the coherence of the FRF from `{input}` to `{output}` is {coherence} at {frequency_hz} Hz: a coherence is from 0 to 1, NaN where it is not known; estimate it again or leave it out"
+        "the coherence of the FRF from `{input}` to `{output}` is {coherence} at {frequency_hz} Hz: a coherence must lie between 0 and 1, or be NaN \
+         if it is not known; estimate it again or leave it out"
     )]
     Coherence {
         /// The row's name.
@@ -510,7 +511,7 @@ pub enum FrfError {
         coherence: f64,
     },
     /// A line at s = 0 cannot be divided by s.
-    #[error("line {line} is at s = 0: a {} has no receptance there; cut the line out", quantity.frf_name())]
+    #[error("line {line} is at s = 0: a {} has no receptance there; remove the line", quantity.frf_name())]
     DivisionByZero {
         /// Index of the line.
         line: usize,

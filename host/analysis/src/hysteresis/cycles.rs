@@ -4,13 +4,12 @@
 //! several times the memory of the record. They are therefore cut on demand, on all cores, and
 //! whatever is needed of all cycles is summed in the same pass.
 //!
-//! One closed cycle of a record.
-//!
 //! First and third harmonic of a cycle's signals.
 //!
 //! Integration of velocity to displacement.
 
 use super::HysteresisError;
+use super::cycle::Cycle;
 use super::loops::{energy, swing};
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::static_arm::Correction;
@@ -492,23 +491,6 @@ fn cubic(x: &[f64], t: f64, drift: f64, to: &mut [f64]) {
                     * (p2 - p0 + t * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + t * (3.0 * (p1 - p2) + p3 - p0)));
         }
     });
-}
-
-/// One closed cycle: M equidistant points of one period.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Cycle {
-    /// Relative displacement, mean removed, m.
-    pub displacement_m: Vec<f64>,
-    /// Relative velocity, mean removed, m/s.
-    pub velocity_m_per_s: Vec<f64>,
-    /// Tangential force, mean removed, N.
-    pub force_n: Vec<f64>,
-}
-
-impl Cycle {
-    pub(super) fn signals(&self) -> [&[f64]; 3] {
-        [&self.displacement_m, &self.velocity_m_per_s, &self.force_n]
-    }
 }
 
 /// Amplitudes of one signal over one cycle: at the fundamental, and at its third harmonic.

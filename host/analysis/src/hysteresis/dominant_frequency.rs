@@ -190,7 +190,7 @@ struct Line<'a> {
 impl NullaryFnOnce for Line<'_> {
     type Output = Complex<f64>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) -> Complex<f64> {
         let (mut cos, mut sin) = ([0.0; SHARED], [0.0; SHARED]);

@@ -1,7 +1,7 @@
 //! Quantities of one closed loop of T over Δx. Each has its own name, because at 200 Hz near a
 //! hidden resonance the peak secant is 213 N/µm where the least-squares slope is 90 N/µm.
 
-use super::cycles::Cycle;
+use super::cycle::Cycle;
 use crate::vectors::dot;
 use num_complex::Complex;
 use serde::Serialize;

@@ -17,12 +17,15 @@
 pub mod analyse;
 pub mod backbone;
 pub mod compliance;
+pub mod cycle;
 pub mod cycles;
 mod dominant_frequency;
 pub mod finding;
+pub mod first_cycle;
 pub mod hammer_slip;
 mod hum;
 pub mod impact;
+pub mod loop_analysis;
 pub mod loops;
 pub mod phase_split;
 pub mod record;
@@ -33,9 +36,9 @@ mod steady;
 mod stick;
 mod timing;
 
-pub use analyse::{Kind, LoopAnalysis};
 pub use analyse::{analyse, analyse_both, analyse_corrected};
 pub use finding::LoopFinding;
+pub use loop_analysis::{Kind, LoopAnalysis};
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};
 pub use shape::{Shape, ShapeEvidence};

@@ -10,7 +10,7 @@
 //! has both flanks and plateaus, τ and c can be separated from each other and from any law of
 //! friction.
 
-use super::cycles::Cycle;
+use super::cycle::Cycle;
 use super::finding::LoopFinding;
 use nalgebra::{DMatrix, DVector};
 

@@ -1,12 +1,12 @@
 //! Analyses a shaker record: averages its cycles, and evaluates the average loop and its scatter.
 
 use super::HysteresisError;
-use super::analyse::{Kind, LoopAnalysis};
-use super::cycles::Cycle;
+use super::cycle::Cycle;
 use super::cycles::Harmonics;
 use super::cycles::{CycleForce, Steady, Summed};
 use super::finding::LoopFinding;
 use super::hum;
+use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{
     OverCycles, closed_swing, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
 };
@@ -310,9 +310,11 @@ impl SteadyRecord<'_> {
             (Shape::Stuck, _) => Some(k_eq),
             (_, None) => {
                 warnings.push(if evidence.is_unsure() {
-                    "an ellipse as far as the noise shows: it may hide slip, or something between the measured spots resonates near this frequency, or damps, or the force is out of step; its slope is no contact stiffness".into()
+                    "an ellipse within the noise: it may hide slip, or something between the measured spots resonates near this frequency or adds \
+                     damping, or the force is out of step with the motion; its slope is no contact stiffness".into()
                 } else {
-                    "an ellipse without slip: something between the measured spots resonates near this frequency, or damps, or the force is out of step, which an ellipse cannot tell apart; its slope is no contact stiffness".into()
+                    "an ellipse without slip: something between the measured spots resonates near this frequency or adds damping, or the force is out \
+                     of step with the motion; an ellipse alone does not show which. Its slope is no contact stiffness".into()
                 });
                 None
             }

@@ -313,7 +313,7 @@ struct Fold<'a> {
 impl NullaryFnOnce for Fold<'_> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let Fold { samples, at, places, weights, factors, .. } = self;
@@ -337,7 +337,7 @@ impl NullaryFnOnce for Fold<'_> {
 
 /// These are arguments rather than fields because the compiler assumes only for arguments that they
 /// do not alias; otherwise it adds one number at a time.
-#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[expect(clippy::too_many_arguments, reason = "see above")]
 #[inline(always)]
 fn fold(

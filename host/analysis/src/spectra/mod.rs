@@ -32,10 +32,10 @@ pub use window::{ForceWeighting, PulseSamples, Windowing};
 #[non_exhaustive]
 pub enum SpectraError {
     /// No hit to average.
-    #[error("no hit to average: every one was refused, or there is none")]
+    #[error("no hits to average: all were refused, or none were recorded")]
     NoHits,
     /// A hit differs in length from the first.
-    #[error("a record has {found} samples, the others {expected}: average only records of one length")]
+    #[error("a record has {found} samples, the others {expected}: all records must have the same length")]
     Samples {
         /// Samples found.
         found: usize,
@@ -64,7 +64,7 @@ pub enum SpectraError {
     },
     /// The transform is shorter than the records.
     #[error(
-        "a transform of {transform} samples is shorter than the records of {samples}: zero padding makes it longer"
+        "a transform of {transform} samples is shorter than the records of {samples}: choose a longer one; the records are padded with zeros"
     )]
     Padding {
         /// Requested length.
@@ -73,7 +73,7 @@ pub enum SpectraError {
         samples: usize,
     },
     /// Spectra that do not match and cannot be added or combined.
-    #[error("the spectra have other lines, another window or other responses: they do not belong together")]
+    #[error("the spectra differ in their lines, window or responses, so they cannot be combined")]
     Unlike,
     /// The transform failed (unsupported length).
     #[error("Fourier transform: {0}")]

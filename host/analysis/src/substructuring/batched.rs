@@ -8,8 +8,8 @@ use super::lanes::{
     LaneCell, Matrix, Pool, Reliable, inverse, lines, minus, plus, product, times, to_left_of,
 };
 use super::measured_set::{MeasuredSet, Side};
+use super::per_line::{LineRefusal, Work};
 use super::reduced::{Reduced, RefusedReason};
-use super::solve::{LineRefusal, Work};
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix};

@@ -63,7 +63,7 @@ pub enum Unfit {
     Failed(FitError),
     /// The model of a spring and a damper between A and B does not describe the data.
     #[error(
-        "the residuals are {:.1} times what noise and errors of position allow, so something that is no spring and damper lies between the arms, or A or B changed",
+        "the residuals are {:.1} times what noise and errors of position allow, so the arms are not connected by a spring and damper alone, or A or B changed",
         chi_square.sqrt()
     )]
     Misfit {
@@ -72,14 +72,14 @@ pub enum Unfit {
     },
     /// No fit has tested its model.
     #[error(
-        "nothing says whether a spring and a damper are all that lies between the arms: measure A and B alone as well"
+        "it was not tested whether a spring and a damper alone connect the arms: measure A and B alone as well"
     )]
     Unchecked,
     /// It relies on the model that failed in the fit.
-    #[error("it would be the mean of what is no spring and damper")]
+    #[error("its model failed in the fit: the arms are not connected by a spring and damper alone")]
     SameModel,
     /// Noise or errors of geometry leave no narrow interval.
-    #[error("the data do not tell it from {:.0} N/µm and above", low_n_per_m * 1e-6)]
+    #[error("the data give only a lower limit, {:.0} N/µm", low_n_per_m * 1e-6)]
     NotIdentified {
         /// The lower limit that is left, N/m.
         low_n_per_m: f64,
@@ -88,7 +88,7 @@ pub enum Unfit {
     #[error("the noise of the FRFs is not known")]
     NoiseUnknown,
     /// Noise changes the estimate by more than can be corrected.
-    #[error("noise alone moves it by {:.0} %, and so large a correction is not known", fraction * 100.0)]
+    #[error("noise alone shifts it by {:.0} %, which is too much to be corrected", fraction * 100.0)]
     Moved {
         /// Fraction of the stiffness.
         fraction: f64,
@@ -116,7 +116,7 @@ pub enum NoStiffness {
     },
     /// Both hold, and contradict each other.
     #[error(
-        "not identified: the fit says {:.1} N/µm and the assembly alone {:.1}, further apart than both intervals allow; A or B alone is not what it is in the assembly",
+        "not identified: the fit says {:.1} N/µm and the assembly alone {:.1}, further apart than both intervals allow; A or B is not the same alone as in the assembly",
         fit_n_per_m * 1e-6, recommended_n_per_m * 1e-6
     )]
     Contradiction {
@@ -292,7 +292,7 @@ mod tests {
         let (poor, misfit) = (fitted(30e6, 0.5e6, 5.0, true), FitError::Misfit { chi_square: 40.0 });
         for fit in [Ok(&poor), Err(&misfit)] {
             let why = between_arms(Some(fit), Some(&other)).expect_err("refused").to_string();
-            assert!(why.contains("no spring and damper"), "{why}");
+            assert!(why.contains("by a spring and damper alone"), "{why}");
         }
     }
 

@@ -121,7 +121,7 @@ pub fn cmif(a: &Frf, b: &Frf, ajb: &Frf, geometry: &Geometry) -> Result<Cmif, Fr
         .unwrap_or(IdmSet::Six);
     let percent = |n: usize| format!("{n} explain {:.0} %", 100.0 * explained[&n]);
     let reason = format!(
-        "of the motion that coupling adds, {}, {} and {}: {} modes are the fewest that keep {:.0} % of what all six do",
+        "of the motion that coupling adds, {}, {} and {}: {} modes are the fewest that explain {:.0} % of what all six explain",
         percent(2),
         percent(4),
         percent(6),

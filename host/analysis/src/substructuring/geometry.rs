@@ -44,7 +44,7 @@ impl TryFrom<u8> for Grouping {
             5 => Ok(Grouping::SpecimenA),
             6 => Ok(Grouping::SpecimenB),
             other => Err(format!(
-                "{other} is no grouping: 1 and 2 are the interfaces of A and B, 3 and 4 their internals, 5 and 6 the specimens"
+                "there is no grouping {other}: 1 and 2 are the interfaces of A and B, 3 and 4 their internals, 5 and 6 the specimens"
             )),
         }
     }

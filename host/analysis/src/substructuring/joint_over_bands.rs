@@ -220,19 +220,19 @@ fn scatter_warnings(k: &BandStatistic) -> Vec<String> {
     let mut warnings = Vec::new();
     if k.std > 0.5 * k.mean.abs() {
         warnings.push(format!(
-            "k_z scatters by {:.0} % of its mean: where noise exceeds the joint's admittance the mean falls towards zero by itself",
+            "k_z scatters by {:.0} % of its mean: noise larger than the joint's admittance biases the mean towards zero",
             100.0 * k.std / k.mean.abs()
         ));
     }
     if (k.mean - k.median).abs() > 0.2 * k.mean.abs().max(k.median.abs()) {
         warnings.push(format!(
-            "mean {:.1} and median {:.1} N/µm of k_z disagree: single lines carry the mean",
+            "mean {:.1} and median {:.1} N/µm of k_z disagree: single lines dominate the mean",
             k.mean * 1e-6,
             k.median * 1e-6
         ));
     }
     if k.mean < 0.0 {
-        warnings.push("a negative mean stiffness is no property of a joint: the interface is described by too few IDMs, or noise prevails".into());
+        warnings.push("a joint cannot have a negative mean stiffness: the interface is described by too few IDMs, or noise dominates".into());
     }
     warnings
 }

@@ -48,6 +48,7 @@ mod lanes;
 pub mod line_noise;
 mod measured_set;
 pub mod method;
+mod per_line;
 mod product;
 pub mod pseudo_inverse;
 pub mod quality;

@@ -58,7 +58,7 @@ where
 {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         match self.rows {
@@ -73,7 +73,7 @@ where
     A: Copy + Mul<B, Output = Complex<f64>>,
     B: Copy,
 {
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn of(self, rows: usize) {
         let factors = self.factors.chunks_exact(self.inner.max(1));
@@ -84,7 +84,7 @@ where
 }
 
 /// Adds three columns at a time, which saves two of three loads and stores of the sum.
-#[expect(clippy::inline_always, reason = "only there the size is known")]
+#[expect(clippy::inline_always, reason = "must be inlined for the size to be a constant")]
 #[inline(always)]
 fn add_columns_of<A, B>(rows: usize, sum: &mut [Complex<f64>], columns: &[A], factors: &[B])
 where

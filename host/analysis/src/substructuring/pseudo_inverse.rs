@@ -95,7 +95,7 @@ const ANY: usize = 0;
 impl<const N: usize> NullaryFnOnce for Elimination<'_, N> {
     type Output = Option<Line>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) -> Option<Line> {
         let n = if N == ANY { self.a.nrows() } else { N };
@@ -156,7 +156,7 @@ struct Orthogonalisation<'a> {
 impl NullaryFnOnce for Orthogonalisation<'_> {
     type Output = Option<Line>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) -> Option<Line> {
         let a = self.a;

@@ -71,7 +71,7 @@ pub enum SemmError {
     Singular(#[from] RankLost),
     /// Only rounding, or nothing, would remain of an inverse.
     #[error(
-        "with {dropped} of {all} singular values left out, {left} remain that are no rounding: leave out fewer, or others"
+        "with {dropped} of {all} singular values left out, {left} remain that are above rounding errors: leave out fewer, or others"
     )]
     Truncation {
         /// Number to be left out.

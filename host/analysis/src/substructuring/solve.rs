@@ -1,13 +1,12 @@
 //! Z^J of every line by every requested method.
-//!
-//! Z^J of one separate line by one method, for lines near rank loss or with a refusal.
 
 use super::batched::{Job, LineResults};
-use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
+use super::decoupling::{DecouplingError, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
 use super::internal_dofs::Rearrangement;
 use super::measured_set::{MeasuredSet, Side};
 use super::method::Method;
+use super::per_line::{LineRefusal, Stage, Work};
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
 use super::reduced::{MethodKind, Reduced, RefusedReason};
@@ -123,35 +122,6 @@ impl Reduced {
             ));
         }
         Ok(MethodPlan { work: Work::Internals(Box::new(internals)), notes, internals: found })
-    }
-}
-
-/// The operation that a method applies to a line.
-pub(super) enum Work<'a> {
-    Internals(Box<Rearrangement<'a>>),
-    Interface,
-    Primal(PrimalBlock),
-    Inverse(InverseBlock),
-}
-
-/// Order of the computation: each stage is done for all lines before the next, which decides the
-/// refusal that is reported.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Stage {
-    Assembly,
-    Impedance,
-    Method,
-}
-
-/// The refusal of a line.
-pub(super) struct LineRefusal {
-    pub(super) stage: Stage,
-    pub(super) reason: RefusedReason,
-}
-
-impl Stage {
-    fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> LineRefusal {
-        move |reason| LineRefusal { stage: self, reason: reason.into() }
     }
 }
 

@@ -72,7 +72,7 @@ pub enum VirtualPointsError {
         source: VptError,
     },
     /// The geometry has no such channel or impact.
-    #[error("the geometry has no {kind} `{name}`, of which virtual point `{point}` is to be made")]
+    #[error("the geometry has no {kind} `{name}`, which virtual point `{point}` needs")]
     Unknown {
         /// `output` or `input`.
         kind: &'static str,
@@ -82,7 +82,7 @@ pub enum VirtualPointsError {
         point: String,
     },
     /// One channel or impact belongs to two virtual points.
-    #[error("{kind} `{name}` belongs to two virtual points: it can count in one only")]
+    #[error("{kind} `{name}` belongs to two virtual points: it may belong to only one")]
     Shared {
         /// `output` or `input`.
         kind: &'static str,

@@ -25,7 +25,7 @@ const RANK_FLOOR: f64 = 1e-6;
 pub enum VptError {
     /// Too few points, or points that cannot distinguish two motions.
     #[error(
-        "the {kind} ({names}) fix {rank} of {needed} motions of the virtual point (scaled singular values {singular_values:.6?}): \
+        "the {kind} ({names}) determine only {rank} of {needed} motions of the virtual point (scaled singular values {singular_values:.6?}): \
          add points off the line of the others, or use fewer IDMs"
     )]
     RankDeficient {

@@ -114,7 +114,7 @@ def test_the_same_campaign_gives_the_same_bytes_and_checksums_that_hold(lab_file
         assert query(columns, f"SELECT count(*) FROM 'DIR/{name}'") == [(told["rows"],)]
         assert (again / name).read_bytes() == content
     said = command("export", lab_file, "--format", "parquet", "--out", again, code=1).stderr
-    assert "an export is in this folder already" in said
+    assert "this folder contains an export already" in said
 
 
 def test_a_damaged_record_is_named_and_a_killed_export_leaves_no_half_file(lab_file: Path, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ impl Plan {
         }
         for spot in ["LDV_A", "LDV_B"] {
             if !self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == spot) {
-                needs.push(format!("the place of {spot} among geometry.sensor"));
+                needs.push(format!("the position of {spot} in geometry.sensor"));
             }
         }
         needs

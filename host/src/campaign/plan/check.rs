@@ -196,7 +196,7 @@ impl Plan {
             faults.unless(
                 seen.insert(name),
                 at,
-                format!("geometry: the name `{name}` stands twice: every {kind} needs a name of its own"),
+                format!("geometry: the name `{name}` is used twice: every {kind} needs its own name"),
             );
         }
         for point in &self.geometry.response {
@@ -246,7 +246,7 @@ impl Plan {
                 faults.unless(
                     taken.insert(channel),
                     at,
-                    format!("geometry: channels of `{name}`: `{channel}` stands twice; a channel is at one point only"),
+                    format!("geometry: channels of `{name}`: `{channel}` is listed twice; a channel belongs to one point only"),
                 );
             }
         }
@@ -282,7 +282,7 @@ impl Plan {
                     faults.unless(
                         seen.insert((name, *impact, *response)),
                         at,
-                        format!("configuration `{name}`: the cell {impact} × {response} stands twice"),
+                        format!("configuration `{name}`: the cell {impact} × {response} is listed twice"),
                     );
                 }
             }
@@ -305,6 +305,6 @@ fn check_names(names: &[Spanned<String>], known: &HashSet<&str>, field: &str, fa
             at,
             format!("configuration.{field}: the geometry has no point `{name}`"),
         );
-        faults.unless(seen.insert(name), at, format!("configuration.{field}: `{name}` stands twice"));
+        faults.unless(seen.insert(name), at, format!("configuration.{field}: `{name}` is listed twice"));
     }
 }

@@ -46,7 +46,7 @@ pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{source_name}:{line}: {what} (docs/campaigns.md explains every field{})",
-    if *more == 0 { String::new() } else { format!("; `jointrig plan check` tells {more} more") }
+    if *more == 0 { String::new() } else { format!("; `jointrig plan check` lists {more} more") }
 )]
 pub struct PlanError {
     /// The file.
@@ -235,7 +235,7 @@ impl ShakerPlan {
     /// Instruction for measuring them, for a user whose plan contains levels.
     pub fn remark(&self, file: &std::path::Path) -> String {
         format!(
-            "the plan's {} levels of the shaker, before and after the cells: `jointrig shaker {} --device ADDR` measures them",
+            "the plan has {} shaker levels, before and after the cells: measure them with `jointrig shaker {} --device ADDR`",
             self.levels(),
             crate::advice::quoted(file)
         )
@@ -389,7 +389,7 @@ impl Plan {
         faults.unless(
             self.by_hand().is_none() || self.force.get_ref().softer.is_none(),
             at,
-            "force.softer needs the coil: nobody hits twice as he means to (hammer.by)",
+            "force.softer needs the coil: a hand-held hammer cannot hit with a chosen force (hammer.by)",
         );
     }
 }

@@ -71,7 +71,7 @@ pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>], faults: &mut Fault
         let name = &sensor.name;
         let positive = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
         let what = if !seen.insert(name) {
-            format!("channel: `{name}` stands twice")
+            format!("channel: `{name}` is listed twice")
         } else if !positive(sensor.sensitivity_v) || !positive(sensor.range) {
             format!("channel `{name}`: sensitivity_v and range must be over 0 (the sign is its polarity)")
         } else if sensor.polarity.is_some_and(|sign| sign.abs() != 1) {
@@ -79,7 +79,7 @@ pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>], faults: &mut Fault
         } else if sensor.delay_s.is_some_and(|delay_s| !(0.0..=1.0).contains(&delay_s)) {
             format!("channel `{name}`: delay_s must be 0 to 1 s")
         } else if sensor.uncertainty.is_some_and(|part| !(0.0..1.0).contains(&part)) {
-            format!("channel `{name}`: uncertainty is relative: 0.01 stands for 1 %")
+            format!("channel `{name}`: uncertainty is relative: 0.01 means 1 %")
         } else if sensor.calibrated.as_ref().is_some_and(|date| date.parse::<jiff::civil::Date>().is_err()) {
             format!("channel `{name}`: calibrated must be a date, YYYY-MM-DD")
         } else {
@@ -211,7 +211,7 @@ impl Plan {
             (0.0..=STRONGEST_WINDOW_PER_S).contains(&self.window.get_ref().exponential_per_s),
             self.window.span().start,
             format!(
-                "window.exponential_per_s must be 0 to {STRONGEST_WINDOW_PER_S}: a negative one would grow"
+                "window.exponential_per_s must be 0 to {STRONGEST_WINDOW_PER_S}: a negative one would make the window grow"
             ),
         );
         self.check_errors(faults);
@@ -229,7 +229,7 @@ impl Plan {
         faults.unless(
             f64::from(trigger.level_n) < force.target_n,
             at,
-            "trigger.level_n must be below force.target_n, or no hit is seen",
+            "trigger.level_n must be below force.target_n, or no hit is detected",
         );
         let (limits, at) = (self.limits.get_ref(), self.limits.span().start);
         faults.unless(
@@ -270,7 +270,8 @@ impl Plan {
                 far.is_none(),
                 at,
                 format!(
-                    "geometry: `{name}` stands at {} m, and no place may be further than {FARTHEST_M} m from the origin: positions are in m, not in mm",
+                    "geometry: `{name}` is at {} m, and no position may be further than {FARTHEST_M} m from the origin: \
+                     positions are in m, not in mm",
                     far.unwrap_or(0.0)
                 ),
             );

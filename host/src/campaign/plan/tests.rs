@@ -73,7 +73,7 @@ fn blocks_of_a_configuration_add_up_and_no_cell_stands_twice() {
 
     let twice = PAPER_CONTACT.replace("responses = [\"S1\", \"S2\"", "responses = [\"B3\", \"S2\"");
     let said = Plan::parse(&twice, "my.toml").expect_err("a cell twice").to_string();
-    assert!(said.contains("AZ1 × B3 stands twice"), "{said}");
+    assert!(said.contains("AZ1 × B3 is listed twice"), "{said}");
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn a_hammer_and_a_sensor_at_one_point_may_share_its_name() {
     );
     let twice = SMALL.replace("\"A2\"", "\"A1\"");
     let said = Plan::parse(&twice, "my.toml").expect_err("two sensors").to_string();
-    assert!(said.contains("`A1` stands twice"), "{said}");
+    assert!(said.contains("`A1` is listed twice"), "{said}");
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn errors_point_at_line_and_field() {
         ("wanted = 2", "wnated = 2", "wnated"),
         ("minimum = 1", "minimum = 3", "minimum <= wanted"),
         ("impacts = [\"BZ1\"]", "impacts = [\"BZ7\"]", "no point `BZ7`"),
-        ("responses = [\"B1\"]", "responses = [\"B1\", \"B1\"]", "stands twice"),
+        ("responses = [\"B1\"]", "responses = [\"B1\", \"B1\"]", "is listed twice"),
         ("name = \"B\"", "name = \"C\"", "must be A, B or AJB"),
         ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
         ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 7", "must be 1 to 6"),
@@ -136,7 +136,7 @@ fn sensors_that_stay_and_a_hammer_by_hand() {
     assert_eq!(stays.own_channels("A2").map(<[String]>::len), Some(3));
     assert_eq!(stays.own_channels("B1"), None);
     for (channels, word) in
-        [("[\"a\"]", "must be 3, one for each axis, not 1"), ("[\"a\", \"b\", \"a\"]", "`a` stands twice")]
+        [("[\"a\"]", "must be 3, one for each axis, not 1"), ("[\"a\", \"b\", \"a\"]", "`a` is listed twice")]
     {
         let said = of("{ name = \"A2\", grouping = 1", &point(channels)).expect_err(channels).to_string();
         assert!(said.contains(word), "{said}");
@@ -239,7 +239,7 @@ fn everything_that_is_wrong_is_told_at_once_by_line() {
         assert!(fault.line == line(at) && fault.what.contains(word), "{at}: {fault}");
     }
     let first = Plan::parse_new(&text, "my.toml").expect_err("five faults").to_string();
-    assert!(first.contains("`jointrig plan check` tells 4 more"), "{first}");
+    assert!(first.contains("`jointrig plan check` lists 4 more"), "{first}");
     // a value of the wrong type hides the errors that only a complete plan shows
     let unreadable = text.replace("version = 1", "version = \"one\"");
     let all = Plan::parse_all(&unreadable, "my.toml").expect_err("it cannot be read");

@@ -210,7 +210,7 @@ fn done(store: &Store, edit: Edit) -> Result<(EditResult, Option<Recount>), Stor
         Some(verdict) => verdict,
         None => match before_last(store, record, row.verdict)? {
             Some(before) => before,
-            None => return Ok((Err(format!("record {record}: nobody has overruled its verdict")), None)),
+            None => return Ok((Err(format!("record {record}: its verdict was never overruled")), None)),
         },
     };
     if verdict == Verdict::Good && row.scans == 0 {

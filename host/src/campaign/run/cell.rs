@@ -8,7 +8,7 @@
 
 use super::answers::Question;
 use super::by_hand;
-use super::runner::RunError;
+use super::error::RunError;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
 use super::stage::{Moved, Stage, Who};
@@ -44,7 +44,7 @@ impl Runner<'_> {
             Moved::Redo => {
                 self.tally.redo(row.id);
                 self.earlier.forget(row.id);
-                still(self.keeper.redo(row.id, "struck anew, as a person asked at the prompt"))?;
+                still(self.keeper.redo(row.id, "hit again, as requested at the prompt"))?;
                 return self.cell(row);
             }
         }
@@ -112,7 +112,7 @@ impl Runner<'_> {
                 Outcome::TooEarly { recording, place, ratio } => {
                     let name = &self.channels.channels[place].name;
                     let sentence = format!(
-                        "{}: {name} still moved {ratio:.1} times as much as it may",
+                        "{}: {name} still moved {ratio:.1} times the allowed amount",
                         by_hand::TOO_EARLY
                     );
                     let judged = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
@@ -156,7 +156,7 @@ impl Runner<'_> {
                 }
                 Outcome::Cancelled(_) => {
                     setbacks += 1;
-                    let why = "the device took the shot back";
+                    let why = "the device cancelled the shot";
                     self.check_safe()?;
                     if !self.set_back(row, setbacks, why)? {
                         self.give_up(row, why)?;
@@ -231,8 +231,8 @@ impl Runner<'_> {
     /// seed.
     fn differs(&mut self, row: &CellRow, record: i64) -> Result<(), RunError> {
         let text = format!(
-            "{}: struck once more, record {record} came out otherwise: another rig, or another seed, than it was measured with; \
-             going on with this one",
+            "{}: record {record}, measured again, came out differently: this is another rig or another seed than it was measured \
+             with; continuing with this one",
             name(&row.cell)
         );
         self.saw(&Seen::Remark(&text));

@@ -11,6 +11,7 @@ pub mod answers;
 pub(in crate::campaign) mod by_hand;
 pub mod cell;
 mod clock;
+pub mod error;
 mod keeper;
 pub mod progress;
 pub mod pulse;

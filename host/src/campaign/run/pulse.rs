@@ -6,7 +6,7 @@
 //!
 //! Checks whether the device fits the plan, before anything moves.
 
-use super::runner::RunError;
+use super::error::RunError;
 use crate::campaign::plan::{Force, Plan};
 use crate::campaign::store::calibration_table::Calibration;
 use crate::device::channels::ChannelMap;
@@ -178,8 +178,8 @@ fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), Str
         let Some(own) = &point.channels else {
             if channels.responses().is_none_or(|axes| axes.len() != 3) {
                 return Err(format!(
-                    "the vibrometer is to come to `{}`, and its three axes are not among the device's channels (a sensor that stays there \
-                     is named in geometry.response.channels)",
+                    "the vibrometer is to measure at `{}`, but the device has no channels for its three axes (name a fixed sensor in \
+                     geometry.response.channels)",
                     point.name
                 ));
             }
@@ -190,7 +190,7 @@ fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), Str
                 let there: Vec<&str> =
                     channels.channels.iter().map(|channel| channel.name.as_str()).collect();
                 return Err(format!(
-                    "it has no channel `{name}`, where the sensor at `{}` is to be (geometry.response.channels); it has {}",
+                    "it has no channel `{name}` for the sensor at `{}` (geometry.response.channels); its channels are {}",
                     point.name,
                     there.join(", ")
                 ));
@@ -202,7 +202,7 @@ fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), Str
             ) || !matches!(channel.role, Role::Auxiliary | Role::Response(_))
             {
                 return Err(format!(
-                    "its channel `{name}` measures something else than the motion at `{}` (geometry.response.channels)",
+                    "its channel `{name}` does not measure the motion at `{}` (geometry.response.channels)",
                     point.name
                 ));
             }
@@ -237,7 +237,7 @@ pub(super) fn with_sensors(plan: &Plan, channels: &ChannelMap) -> Result<(Channe
         if *channel != device {
             let is = 1.0 / f64::from(channel.units_per_volt).abs();
             remarks.push(format!(
-                "channel `{name}`: the plan's {is:.6} V per {unit} and {} ns count, not the device's {says:.6} V and {} ns",
+                "channel `{name}`: the plan's {is:.6} V per {unit} and {} ns are used, not the device's {says:.6} V and {} ns",
                 channel.delay_ns, device.delay_ns
             ));
         }

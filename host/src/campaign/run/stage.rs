@@ -8,9 +8,9 @@ use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::session_table::SessionInfo;
-use crate::device::address::Simulated;
 use crate::device::error::DeviceError;
 use crate::device::session::Session;
+use crate::device::transport::Simulated;
 use crate::untrusted_text::{tell, tell_line};
 use jointrig_protocol::answer::Info;
 use jointrig_protocol::request::Stage as StageRequest;
@@ -63,7 +63,7 @@ pub enum StageError {
     },
     /// Nobody answered.
     #[error(
-        "nobody is there to move hammer and laser (no terminal): use --yes, --stage exec:COMMAND or --stage device"
+        "moving hammer and laser needs a person, and there is no terminal: use --yes, --stage exec:COMMAND or --stage device"
     )]
     NobodyThere,
     /// A person stopped the campaign.
@@ -216,7 +216,7 @@ fn ask_both(what: &str, answers: &Answers, question: Question) -> Result<Key, St
             Ok(line) => match understood(&line) {
                 Understood::Key(key) => return Ok(key),
                 Understood::Quit => return Err(StageError::Stopped),
-                Understood::Nothing => tell(&format!("`{}` is none of these\n{QUESTION}", line.trim())),
+                Understood::Nothing => tell(&format!("`{}` is not one of these\n{QUESTION}", line.trim())),
             },
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LISTEN),
@@ -265,7 +265,7 @@ fn prompt(
             Understood::Key(key) => return Ok(key),
             Understood::Quit => return Err(StageError::Stopped),
             Understood::Nothing => {
-                let _ = writeln!(screen, "`{}` is none of these", line.trim().to_ascii_lowercase());
+                let _ = writeln!(screen, "`{}` is not one of these", line.trim().to_ascii_lowercase());
             }
         }
     }
@@ -300,9 +300,9 @@ pub(super) fn another(
         let named = |name: &str, seed: u64| format!("the simulated rig `{name}`, seed {seed}");
         let (old, new) = (named(&was.name, was.seed), named(&is.rig, is.seed));
         return Ok(if old != new {
-            Some(format!("its records are of {old}, and this is {new}"))
+            Some(format!("its records were measured on {old}, but this is {new}"))
         } else if was.parameters.is_some_and(|old| old != is.parameters) {
-            Some(format!("its records are of {old}, and a parameter of that rig is another one now"))
+            Some(format!("its records were measured on {old}, and a parameter of that rig has changed since"))
         } else {
             None
         });
@@ -313,7 +313,7 @@ pub(super) fn another(
     let same = (&*before.board, &*before.serial) == (info.board.as_str(), info.serial.as_str());
     Ok((!same).then(|| {
         format!(
-            "its records are of the controller {} {}, and this is {} {}",
+            "its records were measured with the controller {} {}, but this is {} {}",
             before.board, before.serial, info.board, info.serial
         )
     }))
@@ -333,8 +333,8 @@ pub(super) fn same_or_accepted<E: From<StoreError>>(
 ) -> Result<Option<String>, E> {
     match another(store, info, simulated)? {
         Some(what) if !accepted => Err(refuse(format!(
-            "{}: {what}. Hits of two structures belong into two files: create one with `jointrig campaign new`. If it is the same \
-             structure all the same (a controller was replaced), --new-structure goes on, and the report says so",
+            "{}: {what}. Hits of two structures belong in two files: create one with `jointrig campaign new`. If it is the same \
+             structure after all (a controller was replaced), continue with --new-structure; the report states it",
             store.path().display()
         ))),
         accepted => Ok(accepted),
@@ -369,7 +369,7 @@ mod tests {
             let (key, screen) = answered(keys);
             assert_eq!(key.expect(keys), wanted);
             assert!(screen.contains("hammer to AZ1") && screen.contains("q quit"), "{screen}");
-            assert_eq!(screen.contains("`x` is none of these"), keys.starts_with('x'));
+            assert_eq!(screen.contains("`x` is not one of these"), keys.starts_with('x'));
         }
         assert!(matches!(answered("q\n").0, Err(StageError::Stopped)));
         assert!(matches!(answered("").0, Err(StageError::NobodyThere)));

@@ -74,7 +74,7 @@ impl Store {
             .map_err(self.failed("counting cells"))?;
         if there > MOST_CELLS {
             return Err(self.content(format!(
-                "it has {there} cells, and no plan makes more than {MOST_CELLS}: `jointrig campaign verify` says what was added"
+                "it has {there} cells, but a plan makes at most {MOST_CELLS}: `jointrig campaign verify` lists what was added"
             )));
         }
         let sql = format!("SELECT {} FROM cells ORDER BY id", CellColumns::list());

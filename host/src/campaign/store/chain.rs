@@ -204,7 +204,7 @@ pub(super) struct Behind {
 
 impl Behind {
     fn row(table: &str, key: &str, done: &str) -> Self {
-        let what = format!("row {key} of `{table}` was {done} behind jointrig's back");
+        let what = format!("row {key} of `{table}` was {done} outside jointrig");
         Self { row: Some((table.to_owned(), key.to_owned())), what }
     }
 
@@ -232,7 +232,7 @@ pub(super) fn check(connection: &Connection) -> rusqlite::Result<Vec<Behind>> {
             let entry = (table, key, sealed);
             if id != count || linked(&link, id, &entry).as_slice() != stored {
                 let what =
-                    format!("the chain of rows is broken at entry {id}: it was changed, or one is missing");
+                    format!("the chain of rows is broken at entry {id}: an entry was changed or is missing");
                 return Ok(vec![Behind::chain(what)]);
             }
             link = stored;

@@ -42,7 +42,7 @@ pub enum CodecError {
     #[error("compression: {0}")]
     Pco(#[from] pco::errors::PcoError),
     /// The blob ends within a channel, has bytes left over, or its channels differ in length.
-    #[error("the samples' bytes are cut or overgrown")]
+    #[error("there are too few or too many bytes of samples")]
     Shape,
     /// The row claims far more samples than its bytes can hold.
     #[error("{blob} bytes cannot hold {channels} channels of {scans} samples")]

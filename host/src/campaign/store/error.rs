@@ -99,7 +99,7 @@ pub enum StoreError {
     },
     /// The file's log contains records, but the file cannot be written.
     #[error(
-        "{path} was not closed in order and lies where nothing can be written: copy it to a local disk together with \
+        "{path} was not closed properly and lies where nothing can be written: copy it to a local disk together with \
          {path}-wal, which holds its last records"
     )]
     Unfinished {
@@ -108,7 +108,7 @@ pub enum StoreError {
     },
     /// The file disappeared while it was being written.
     #[error(
-        "{path} went away while it was written: {what}; {rescue}. Put the file back or go on with the copy"
+        "{path} disappeared while it was being written: {what}; {rescue}. Put the file back, or continue with the copy"
     )]
     Gone {
         /// The file.
@@ -120,8 +120,8 @@ pub enum StoreError {
     },
     /// It has several names.
     #[error(
-        "{path} has {links} names (hard links): two of them could be measured at once; copy it with `jointrig campaign backup`, or remove \
-         the other names"
+        "{path} has {links} names (hard links): two programs could measure into it at the same time; copy it with `jointrig \
+         campaign backup`, or remove the other names"
     )]
     Links {
         /// The file.
@@ -215,7 +215,7 @@ pub(super) fn sqlite(path: &Path, doing: &'static str, source: rusqlite::Error) 
             "; free some space, then run the same command again: nothing accepted is lost"
         }
         Some(ErrorCode::SystemIoFailure) => {
-            "; is the disk whole, and is there space on it? nothing accepted is lost: run the same command again"
+            "; is the disk healthy, and is there space on it? nothing accepted is lost: run the same command again"
         }
         Some(ErrorCode::DatabaseCorrupt) => {
             "; the file was cut off or damaged: go on from a copy that `jointrig campaign backup` made"

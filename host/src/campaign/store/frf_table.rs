@@ -94,7 +94,7 @@ impl FrfColumns {
         let entries = frequency_hz.len() * rows * columns;
         let values = numbers(&self.frf);
         if values.len() != 2 * entries || self.variance.as_ref().is_some_and(|v| v.len() != 8 * entries) {
-            return Err(format!("it has not {} × {rows} × {columns} values", frequency_hz.len()));
+            return Err(format!("it does not have {} × {rows} × {columns} values", frequency_hz.len()));
         }
         let place = |line: usize, row: usize, column: usize| (line * rows + row) * columns + column;
         let lines = 0..frequency_hz.len();
@@ -109,7 +109,7 @@ impl FrfColumns {
             lines.clone().map(of_line).collect()
         });
         let quantity = MotionQuantity::from_frf_name(&self.quantity)
-            .ok_or_else(|| format!("`{}` is no kind of FRF", self.quantity))?;
+            .ok_or_else(|| format!("`{}` is not a kind of FRF", self.quantity))?;
         let lines = lines.map(matrix).collect();
         let frf = Frf::new(frequency_hz, self.sigma_per_s, quantity, outputs, inputs, lines);
         let whole = frf.and_then(|frf| match variance {
@@ -180,7 +180,7 @@ impl Store {
         let read = |row: &rusqlite::Row<'_>| Ok((FrfColumns::read(row)?, row.get::<_, u32>("crc32")?));
         let (row, crc) = self.connection.query_row(&sql, [id], read).map_err(self.failed("reading FRFs"))?;
         let name = format!("the FRFs of {} from {}", row.configuration, row.source);
-        let read = if row.crc() == crc { row.decoded() } else { Err("their checksum is another".into()) };
+        let read = if row.crc() == crc { row.decoded() } else { Err("their checksum does not match".into()) };
         read.map_err(|what| self.content(format!("{name} are damaged ({what}): import them again")))
     }
 }

@@ -39,7 +39,7 @@
 //! runner writes them from the rig's parameters; nothing of them crosses the protocol, and no
 //! estimator may read them.
 
-use crate::device::address::Simulated;
+use crate::device::transport::Simulated;
 use error::{StoreError, sqlite};
 use jointrig_protocol::answer::Info;
 use rusqlite::config::DbConfig;
@@ -186,7 +186,7 @@ impl Store {
         if let Some(what) = schema::strange(&connection).map_err(open)? {
             return Err(StoreError::Content {
                 path: path.into(),
-                what: format!("{what}. Nothing of it is read"),
+                what: format!("{what}. None of the file is read"),
             });
         }
         let watch = chain::Watch::new(&mut connection).map_err(open)?;
@@ -225,8 +225,8 @@ impl Store {
             }
             // the log was emptied while being read: only the content of the file itself is left
             Err(error) => match std::fs::copy(&self.path, &to) {
-                Ok(_) => format!("what stood in the file without its log was copied to {}", to.display()),
-                Err(_) => format!("and what it held could not be copied ({error})"),
+                Ok(_) => format!("the file's content without its log was copied to {}", to.display()),
+                Err(_) => format!("and its content could not be copied ({error})"),
             },
         };
         Err(StoreError::Gone { path: self.path.clone(), what, rescue })
@@ -292,8 +292,8 @@ impl Store {
         Ok(self.meta(WRITTEN)?.map(|since| {
             let log = log_of(&self.path);
             format!(
-                "it was being written (since {since}), and its log {} is not beside it: if this is a copy, the last records are \
-                 missing. Copy the log too, or use `jointrig campaign backup`, which copies a campaign that runs",
+                "it was being written (since {since}), and its log {} is not next to it: if this is a copy, the last records are \
+                 missing. Copy the log too, or use `jointrig campaign backup`, which can copy a campaign while it runs",
                 log.display()
             )
         }))
@@ -627,9 +627,10 @@ impl Store {
         let copy = Self::open_read_only(to)?;
         if let Some(damage) = copy.verify()?.first() {
             let record = damage.record.map_or("the file".to_owned(), |id| format!("record {id}"));
-            return Err(
-                copy.content(format!("the copy is damaged ({record}: {}); is the original?", damage.what))
-            );
+            return Err(copy.content(format!(
+                "the copy is damaged ({record}: {}): check the original with `jointrig campaign verify`",
+                damage.what
+            )));
         }
         Ok(copy.records()?.len())
     }

@@ -89,7 +89,7 @@ impl Store {
         transaction.execute_batch(&(chain::TABLES.to_owned() + &stay(APPEND_ONLY[5])))?;
         write_log(
             &transaction,
-            "rows are chained from here on; what was changed before shows in records' seals only",
+            "rows are chained from here on; earlier changes show only in the records' seals",
         )?;
         chain::begin(&transaction)?;
         transaction.pragma_update(None, "user_version", VERSION)?;
@@ -178,14 +178,14 @@ pub(super) fn strange(connection: &Connection) -> rusqlite::Result<Option<String
         match ours.get(name) {
             None => {
                 return Ok(Some(format!(
-                    "it has a {kind} `{name}`, which jointrig does not make: if you know who put it there, take it out with a program for \
-                     SQLite (DROP {} {name})",
+                    "it has a {kind} `{name}`, which jointrig does not make: if you know who put it there, remove it with an SQLite \
+                     program (DROP {} {name})",
                     kind.to_uppercase()
                 )));
             }
             Some((own, made)) if own != kind || made != sql => {
                 return Ok(Some(format!(
-                    "its {kind} `{name}` is not as jointrig makes it: take a backup from before that was changed"
+                    "its {kind} `{name}` is not as jointrig makes it: use a backup from before it was changed"
                 )));
             }
             Some(_) => {}

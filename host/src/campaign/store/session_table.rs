@@ -188,7 +188,7 @@ impl Store {
             None => None,
             Some(text) => {
                 let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
-                let wrong = || self.content(format!("session {session}: `{text}` is no sampling rate"));
+                let wrong = || self.content(format!("session {session}: `{text}` is not a sampling rate"));
                 Some(rate.ok_or_else(wrong)?)
             }
         };

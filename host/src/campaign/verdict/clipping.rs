@@ -17,7 +17,7 @@ pub(super) struct Clipped {
 impl Clipped {
     pub(super) fn sentence(&self, channel: &str, unit: &str) -> String {
         format!(
-            "the {channel} stands at {:.4} {unit} for {} samples: it ran into its range",
+            "the {channel} stays at {:.4} {unit} for {} samples: it reached the end of its range",
             self.level, self.samples
         )
     }

@@ -43,8 +43,12 @@ const QUIET_AFTER_PULSE_S: f64 = 0.001;
 /// this many samples before the pulse are skipped.
 const FOOT: usize = 16;
 
-/// Number of differences next to a jump that are part of it, ...
-const OWN: usize = 4;
+/// The larger neighbour of a jump's largest difference is at least this part of it (0.5 without
+/// noise).
+const NEIGHBOUR: f64 = 0.3;
+
+/// Third differences on each side of the largest one of a jump that the jump itself contributes to.
+const OWN: usize = 3;
 
 /// ... and number of differences beyond them that define the usual size.
 const NEXT: usize = 12;
@@ -101,7 +105,13 @@ fn is_jump(differences: &[f64], i: usize, times: f64) -> bool {
     let after = &differences[from..(from + NEXT).min(differences.len())];
     let largest = |part: &[f64]| part.iter().fold(0.0f64, |most, d| most.max(*d));
     let quieter = [before, after].into_iter().filter(|part| part.len() == NEXT).map(largest).reduce(f64::min);
-    differences[i] > times * quieter.unwrap_or(0.0) && differences[i] >= largest(before).max(largest(after))
+    // of a step and of a spike, at least one neighbour is half as large; a beat at a quarter of the
+    // block rate has only every second difference
+    let neighbours = [i.checked_sub(1), Some(i + 1)].into_iter().flatten();
+    let neighbour = neighbours.filter_map(|at| differences.get(at)).fold(0.0f64, |most, d| most.max(*d));
+    neighbour > NEIGHBOUR * differences[i]
+        && differences[i] > times * quieter.unwrap_or(0.0)
+        && differences[i] >= largest(before).max(largest(after))
 }
 
 /// Whether the jump at this third difference is motion of the structure itself.

@@ -70,7 +70,7 @@ impl Judge for ByRecord {
         if missing == 0
             && let Some((name, touched)) = over_range(channels, recording)
         {
-            let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
+            let sentence = format!("channel {name} is at the end of its range for {touched} samples");
             return judged(Verdict::Overload, touched as f64, 1.0, sentence);
         }
         if found.kind == Verdict::Good

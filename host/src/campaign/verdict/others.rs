@@ -84,7 +84,7 @@ impl Others {
             Summing::new(fs_hz, force_n.len(), responses.len(), window, enough.band_hz)
         });
         if let Err(error) = sums.add(&force_n, &responses, &pulse) {
-            log::warn!("a good record does not enter the cell's FRFs: {error}");
+            log::warn!("a good record is left out of the cell's FRFs: {error}");
         }
     }
 }

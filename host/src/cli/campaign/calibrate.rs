@@ -37,7 +37,7 @@ impl Calibrate {
             store.sessions()?.iter().map(|(id, _)| *id).filter(|id| *id >= self.from_session).collect();
         let Some(session) = sessions.last() else {
             return Err(CliError::Bad(format!(
-                "{} has no session from {} on: `campaign run --calibration` takes the file when it measures",
+                "{} has no session from {} on: give the calibration to `campaign run --calibration` when it measures",
                 self.file.display(),
                 self.from_session
             )));
@@ -54,7 +54,7 @@ impl Calibrate {
             let volts = |units_per_volt: f32| 1.0 / f64::from(units_per_volt);
             let (was, is) = (volts(old.units_per_volt), volts(new.units_per_volt));
             said.push(format!(
-                "{}: {was:.6} V per {unit}, now {is:.6} ({:+.2} %); late by {} ns, now {}",
+                "{}: {was:.6} V per {unit}, now {is:.6} ({:+.2} %); delay {} ns, now {}",
                 new.name,
                 100.0 * (is / was - 1.0),
                 old.delay_ns,

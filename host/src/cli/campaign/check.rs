@@ -83,7 +83,7 @@ fn sign_line(found: &Polarity) -> String {
         (Some(sign), Some(true)) => format!("{name:<12} right ({sign:+.2}, {count} hits)"),
         (Some(sign), Some(false)) => format!("{name:<12} TURNED ({sign:+.2}, {count} hits)"),
         (Some(sign), None) => format!("{name:<12} not clear ({sign:+.2}, {count} hits)"),
-        (None, _) => format!("{name:<12} not told: no kept hit along its axis"),
+        (None, _) => format!("{name:<12} unknown: no kept hit along its axis"),
     }
 }
 

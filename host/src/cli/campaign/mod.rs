@@ -87,7 +87,7 @@ pub struct Backup {
 impl Backup {
     pub fn run(self) -> Result<(), CliError> {
         let records = Store::open_read_only(&self.file)?.back_up(&self.copy)?;
-        output::lines([format!("{}: {records} records, all whole", self.copy.display())])
+        output::lines([format!("{}: {records} records, all intact", self.copy.display())])
     }
 }
 

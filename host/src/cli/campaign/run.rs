@@ -143,7 +143,7 @@ impl Run {
         // a plan file that no longer exists, or a built-in plan, was not edited
         if plan_file::read(Path::new(&source)).is_ok_and(|now| now != text) {
             tell_line!(
-                "{source} was edited since: going on with the plan in {}; `--plan {source}` takes the new one over",
+                "{source} was edited since: continuing with the plan in {}; `--plan {source}` adopts the new one",
                 self.file.display()
             );
         }

@@ -44,7 +44,8 @@ impl Status {
         let external = clocks.iter().filter(|row| row.rate_hz.is_some()).count();
         if !clocks.is_empty() {
             output::lines([format!(
-                "in step with another recorder: {external} of {} sessions by its clock, {edges} edges of the sync input and output",
+                "synchronised with another recorder: {external} of {} sessions use its clock, {edges} edges of the sync input \
+                 and output",
                 clocks.len()
             )])?;
         }
@@ -61,7 +62,7 @@ impl Status {
             ),
             match (tally.complete(), tally.given_up()) {
                 (true, _) => "complete".into(),
-                (false, 0) => "not complete: `jointrig campaign run` goes on".into(),
+                (false, 0) => "not complete: continue with `jointrig campaign run`".into(),
                 (false, n) => format!("not complete; {n} cells were given up"),
             },
         ])

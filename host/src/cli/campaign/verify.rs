@@ -40,14 +40,14 @@ impl Verify {
         }
         let frfs = match store.frf_rows()?.len() {
             0 => String::new(),
-            count => format!(" and {count} FRF matrices from elsewhere"),
+            count => format!(" and {count} imported FRF matrices"),
         };
         let chained = if store.has_chain()? {
             ""
         } else {
             "; it is of an older version without a chain, so that only records, levels and FRFs could be checked"
         };
-        output::lines([format!("{path}: {} records{frfs}, all whole{chained}", store.records()?.len())])?;
+        output::lines([format!("{path}: {} records{frfs}, all intact{chained}", store.records()?.len())])?;
         if self.deep { deep(&store) } else { Ok(()) }
     }
 }

@@ -81,7 +81,7 @@ impl Columns<'_> {
             if out.join(name).exists() {
                 let there = out.join(name);
                 let what = format!(
-                    "{}: an export is in this folder already; remove it, or name another",
+                    "{}: this folder contains an export already; remove it, or name another folder",
                     there.display()
                 );
                 return Err(CliError::Bad(what));

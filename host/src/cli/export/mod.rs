@@ -151,7 +151,7 @@ impl Export {
         };
         if self.si {
             return Err(CliError::Usage(
-                "--si is for --format parquet: the other forms are in SI already".into(),
+                "--si is for --format parquet: the other formats are in SI already".into(),
             ));
         }
         Ok(Some(format))
@@ -233,7 +233,7 @@ pub(super) fn analysed(store: &Store, (low_hz, high_hz): (f64, f64)) -> Result<W
         found.frfs.extend(Some(structure).zip(frf));
     }
     if found.frfs.is_empty() {
-        found.told.push("no good hit is in the file yet: there are no FRFs to export".into());
+        found.told.push("the file has no good hit yet: there are no FRFs to export".into());
     }
     Ok(found)
 }

@@ -111,7 +111,7 @@ impl Files<'_> {
                 .map_or(names.is_empty(), |all| (&all.names, &all.quantities) == (&names, &quantities));
             if (cell.impacts.fs_hz, cell.impacts.quantity) != (fs_hz, quantity) || !same {
                 return wrong(
-                    "has another sampling rate, quantity or set of channels than those of its cell before it: export --without-records",
+                    "differs from the earlier records of its cell in sampling rate, quantity or channels: export --without-records",
                 );
             }
             let samples = store.samples(row)?;

@@ -67,7 +67,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
         waiting.at(done, sources.len());
         let told = |error: CliError| match error {
             CliError::Bad(what) | CliError::Usage(what) => bad(format!(
-                "{what}\n{done} of {} files are stored; the same command goes on with this one",
+                "{what}\n{done} of {} files are stored; run the same command again to continue with this one",
                 sources.len()
             )),
             other => other,

@@ -100,7 +100,7 @@ impl Import {
             }
             _ => Err(CliError::Usage(
                 "give --out FILE.npz for an FRF file, or --into FILE.jrig with --configuration (and for records --impact \
-                 and --response); a folder needs --into alone"
+                 and --response); a folder needs only --into"
                     .into(),
             )),
         }
@@ -161,7 +161,8 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
         store.records()?.iter().flatten().filter(|r| own(r.cell) && r.verdict == Verdict::Good).count();
     if kept > 0 {
         return Err(CliError::Bad(format!(
-            "{into}: {name} has {kept} good hits of its own, which FRFs would stand beside: import into a campaign that has none there"
+            "{into}: {name} has {kept} good hits of its own, and a configuration has either hits or imported FRFs: import into \
+             a campaign that has no hits there"
         )));
     }
     match store.frf(name)? {
@@ -173,7 +174,7 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
         }
         Some(there) if !from.replace => {
             return Err(CliError::Bad(format!(
-                "{into}: {name} has other FRFs already, from {} ({}): --replace has these count instead",
+                "{into}: {name} has other FRFs already, from {} ({}): --replace uses these instead",
                 there.source, there.utc
             )));
         }
@@ -186,7 +187,7 @@ fn frfs(store: &Store, from: &Frfs<'_>) -> Result<Vec<String>, CliError> {
         vec![format!("{}: {taken}", from.file.display()), format!("{into}: {name}: {}", described(&frf))];
     if frf.variance().is_none() {
         told.push(
-            "the file tells no variance of its values: what is identified from them has no interval from their noise"
+            "the file states no variance of its values: results identified from them have no interval from their noise"
                 .into(),
         );
     }

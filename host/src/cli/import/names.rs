@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::bad;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
-use crate::exchange::{delimiter, labelled_frf, record_uff};
+use crate::exchange::{delimiter, frf_file, record_uff};
 use crate::untrusted_input;
 use crate::untrusted_text::file_name;
 
@@ -76,7 +76,7 @@ pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<NamedFile>, 
             (true, true) => with_labels_or_frfs(&path, configuration)?,
             _ => {
                 return Err(bad(format!(
-                    "{}: {file} has one of impact and response: give both or none",
+                    "{}: {file} has only one of impact and response: give both or none",
                     table.display()
                 )));
             }
@@ -157,7 +157,7 @@ fn named(
 
 /// A universal file with forces over time contains records; everything else is treated as FRFs.
 fn with_labels_or_frfs(path: &Path, configuration: String) -> Result<Named, CliError> {
-    if labelled_frf::is_npz(path).map_err(bad)? {
+    if frf_file::is_npz(path).map_err(bad)? {
         return Ok(Named::Frfs(configuration));
     }
     let records = record_uff::holds_records(&record_uff::record_contents(path).map_err(bad)?);

@@ -66,7 +66,7 @@ pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<Vec<Quan
         for (place, largest) in largest.iter_mut().enumerate() {
             if let Some(sample) = signal(hit, place).iter().position(|v| !v.is_finite()) {
                 let name = kinds[place].0;
-                return Err(format!("hit {hit}, {name}, sample {sample} is not a number: take the hit out"));
+                return Err(format!("hit {hit}, {name}, sample {sample} is not a number: remove the hit"));
             }
             *largest = signal(hit, place).iter().fold(0.0, |m, v| m.max(v.abs()));
         }
@@ -87,7 +87,7 @@ pub(super) fn quantised(records: &ImpactRecords, axes: usize) -> Result<Vec<Quan
                 // code 32000 for the largest value; the scale is rounded to a float
                 let units_per_volt = (largest.max(1e-30) * 32_768.0 / TOP_CODE / f64::from(range_v)) as f32;
                 map.channels.push(Channel {
-                    name: name.parse().map_err(|_| format!("`{name}` is too long a name"))?,
+                    name: name.parse().map_err(|_| format!("the name `{name}` is too long"))?,
                     role,
                     quantity,
                     units_per_volt,

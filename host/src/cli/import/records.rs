@@ -180,7 +180,7 @@ pub(super) fn bring(
             let force_n = &records.force_n[*hit];
             let pulse = Pulse::locate(force_n);
             if pulse.is_none() && reversed[*hit].is_none() {
-                return Err(wrong(format!("hit {hit} has no force pulse: take it out")));
+                return Err(wrong(format!("hit {hit} has no force pulse: remove it")));
             }
             let own = recording(*hit, codes.clone(), group.map.len(), pulse.as_ref(), records.fs_hz);
             recordings.push((*hit, of_scale, own));
@@ -276,7 +276,7 @@ fn already_there(
     }
     if !older.is_empty() && !replace {
         return Err(bad(format!(
-            "{}: {} good hits of this cell came from another file `{}` before: --replace drops those and takes these instead",
+            "{}: {} good hits of this cell came from another file `{}` before: --replace drops those and uses these instead",
             store.path().display(),
             older.len(),
             origin.name

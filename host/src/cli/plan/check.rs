@@ -86,11 +86,11 @@ fn beside(plan: &Path) -> PathBuf {
 
 fn draw(plan: &Plan, path: &Path) -> Result<(), CliError> {
     let Some(figure) = report::planned_places(&places(plan), plan.name.get_ref()) else {
-        return Err(CliError::Bad("the plan has no place to draw".into()));
+        return Err(CliError::Bad("the plan has no positions to draw".into()));
     };
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     let format = Format::from_str(ending, true)
-        .map_err(|_| CliError::Usage(format!("{}: a picture is .svg or .png", path.display())))?;
+        .map_err(|_| CliError::Usage(format!("{}: a picture must be .svg or .png", path.display())))?;
     report::write_figure(&figure, format, path).map_err(|source| CliError::File {
         path: path.into(),
         doing: "drawing the geometry",

@@ -143,7 +143,8 @@ fn merge(all: &mut Vec<Point>, points: &[Point], configuration: &str) -> Result<
                     == (point.position_m, point.direction, point.grouping) => {}
             Some(_) => {
                 return Err(format!(
-                    "geometry.workbook: `{}` stands elsewhere in {configuration} than in another configuration: give it another name",
+                    "geometry.workbook: `{}` has another position in {configuration} than in another configuration: give it \
+                     another name",
                     point.name
                 ));
             }

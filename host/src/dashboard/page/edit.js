@@ -71,6 +71,6 @@ function answersShown(host){
   if(host.dataset.kind===kind)return;
   host.dataset.kind=kind;
   if(!mayAnswer()){host.replaceChildren(el('p',{className:'say'},other?'A page answers for hammer and laser.':'Answers for hammer and laser come from the terminal.'));return}
-  if(!holding){host.replaceChildren(el('p',{className:'say'},other&&other!==me?'Another page answers for hammer and laser.':'Whoever answers must see the rig: after “in place” the hammer strikes.',' ',el('button',{type:'button',id:'hold',on:{click:()=>hold(true)}},'answer from this page')));return}
-  host.replaceChildren(el('p',{className:'answers'},...['in place','redo','skip','back'].map(t=>el('button',{type:'button',disabled:!asked,on:{click:()=>answer(t)}},t)),' ',el('button',{type:'button',on:{click:()=>hold(false)}},'let go')),el('p',{className:'say'},asked?'This page answers: “in place” lets the hammer strike.':'This page answers; nothing is asked now.'));
+  if(!holding){host.replaceChildren(el('p',{className:'say'},other&&other!==me?'Another page answers for hammer and laser.':'The person who answers must see the rig: after “in place” the hammer strikes.',' ',el('button',{type:'button',id:'hold',on:{click:()=>hold(true)}},'answer from this page')));return}
+  host.replaceChildren(el('p',{className:'answers'},...['in place','redo','skip','back'].map(t=>el('button',{type:'button',disabled:!asked,on:{click:()=>answer(t)}},t)),' ',el('button',{type:'button',on:{click:()=>hold(false)}},'let go')),el('p',{className:'say'},asked?'This page answers: “in place” lets the hammer strike.':'This page answers; there is no question now.'));
 }

@@ -2,8 +2,8 @@
 const VIEWS=[
   {title:'verdicts',say:'Every cell: hits kept of those wanted.'},
   {title:'force',say:'Mean peak force of the good hits, N.',of:n=>n.force_n,number:v=>v.toFixed(1),text:v=>v.toFixed(1)+' N'},
-  {title:'random error',say:'Random error of the FRF, median from 300 Hz to 600 Hz, %, by the last analysis.',of:n=>n.random_error_percent,number:v=>v.toPrecision(2),text:v=>v.toPrecision(2)+' %'},
-  {title:'coherence',say:'Coherence, median from 300 Hz to 600 Hz, by the last analysis.',of:n=>n.coherence,number:v=>v.toFixed(3),text:v=>v.toFixed(3)},
+  {title:'random error',say:'Random error of the FRF, median from 300 Hz to 600 Hz, %, from the last analysis.',of:n=>n.random_error_percent,number:v=>v.toPrecision(2),text:v=>v.toPrecision(2)+' %'},
+  {title:'coherence',say:'Coherence, median from 300 Hz to 600 Hz, from the last analysis.',of:n=>n.coherence,number:v=>v.toFixed(3),text:v=>v.toFixed(3)},
 ];
 const matrixScreen={key:'matrix',title:'Matrix',make(m){
   this.buttons=VIEWS.map(v=>el('button',{type:'button',on:{click:()=>{this.view=v;this.show()}}},v.title));

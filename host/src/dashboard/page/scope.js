@@ -92,14 +92,14 @@ const scopeScreen={key:'scope',title:'Scope',make(m){
   }}}));
   this.say();
 },say(){
-  this.note.textContent=`The last ${scope.span} s of the stream: least and largest value of every short stretch. + and − change the time shown. Grey: frames that this page missed (${scope.missed} so far); red: scans that the link lost.`;
+  this.note.textContent=`The last ${scope.span} s of the stream: smallest and largest value of each short stretch. + and − change the time shown. Grey: frames that this page missed (${scope.missed} so far); red: scans that the link lost.`;
 },show(kind){
   const w=state.whole,stream=w.now.stream;
   if(!w.can.stream){const h=latest();if(h)picture(this.at,`/api/records/${h.record}/channels`);else this.at.replaceChildren(el('p',{className:'absent'},'No hits yet.'));return}
   if(!stream){this.host.replaceChildren(el('p',{className:'absent'},'No stream yet.'));return}
   if(this.rows?.length!==stream.channels.length){
     this.rows=stream.channels.map(c=>{
-      const row={canvas:el('canvas',{role:'img','aria-label':c.name+': least and largest value over time'}),numbers:el('span'),overload:el('b'),range:el('span',{className:'range'})};
+      const row={canvas:el('canvas',{role:'img','aria-label':c.name+': smallest and largest value over time'}),numbers:el('span'),overload:el('b'),range:el('span',{className:'range'})};
       row.element=el('div',{className:'trace'},el('p',{},el('b',{},c.name),' ',row.numbers,' ',row.overload,' ',row.range),row.canvas);
       return row;
     });

@@ -25,7 +25,7 @@ function hitRow(h){
     el('td',{},fixed(h.peak_n,1)+' N'),el('td',{},h.pulse_us+' µs'),el('td',{className:'why'},h.sentence),...editCell(h));
 }
 const hitHead=()=>el('thead',{},el('tr',{},...['record','attempt','verdict','peak','pulse','why',...(mine.edits?['']:[])].map(t=>el('th',{scope:'col'},t))));
-const said=e=>e?.lines.map(([head,text])=>el('p',{},el('b',{},head),' '+text))||[el('p',{className:'absent'},'The analysis has not said anything yet.')];
+const said=e=>e?.lines.map(([head,text])=>el('p',{},el('b',{},head),' '+text))||[el('p',{className:'absent'},'The analysis has no result yet.')];
 const SCREENS=[
   {key:'now',title:'Now',make(m){
     this.next=m.appendChild(el('p',{className:'next',id:'next'}));

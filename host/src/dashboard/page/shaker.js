@@ -14,10 +14,10 @@ const shakerScreen={key:'shaker',title:'Shaker',make(m){
   this.guard.hidden=!s;this.figure.hidden=!s;
   if(s){
     const last=s.windows.at(-1);
-    this.head.textContent=s.title+': '+(s.over?s.over[0]?'✓ recorded':'✕ not recorded':s.settled?'✓ settled, recording':'∿ on its way');
+    this.head.textContent=s.title+': '+(s.over?s.over[0]?'✓ recorded':'✕ not recorded':s.settled?'✓ settled, recording':'∿ approaching');
     // with a controlled drive the motion has no set point
     const measured=s.held==='drive'?'displacement':s.held;
-    this.note.textContent=s.over?s.over[1]:last?`${amountOf(measured,last[1])}${s.held==='drive'?'':` of ${amountOf(s.held,s.order)} ordered (${(100*last[1]/s.order).toFixed(1)} %)`}, drive ${last[2].toPrecision(3)} V of at most ${s.most_drive_v.toPrecision(3)} V, after ${last[0].toFixed(1)} s`:'The order is given.';
+    this.note.textContent=s.over?s.over[1]:last?`${amountOf(measured,last[1])}${s.held==='drive'?'':` of ${amountOf(s.held,s.order)} ordered (${(100*last[1]/s.order).toFixed(1)} %)`}, drive ${last[2].toPrecision(3)} V of at most ${s.most_drive_v.toPrecision(3)} V, after ${last[0].toFixed(1)} s`:'The level is ordered; no value yet.';
     this.note.className=s.over&&!s.over[0]?'refused':'say';
     if(s.windows.length&&Date.now()-(this.asked||0)>300){this.asked=Date.now();picture(this.figure,'/api/now/shaker',true)}
     else if(s.windows.length&&!this.later)this.later=setTimeout(()=>{this.later=0;if(screen===this)this.show()},350);

@@ -16,8 +16,8 @@ use nusb::descriptors::{InterfaceDescriptor, TransferType};
 use nusb::transfer::{Buffer, Bulk, Direction, In, Out, TransferError};
 use nusb::{Device, Endpoint, ErrorKind, Interface, MaybeFuture};
 
-use super::address::Transport;
 use super::error::{DeviceError, INSTALL_UDEV_RULE};
+use super::transport::Transport;
 pub use attached::{Attached, attached};
 use queue::{Incoming, Queue, TRANSFER_BYTES, broken};
 
@@ -89,8 +89,8 @@ fn why(error: &nusb::Error) -> String {
     match error.kind() {
         ErrorKind::PermissionDenied => format!("permission denied: {INSTALL_UDEV_RULE}"),
         ErrorKind::Busy => {
-            "another program holds its vendor interface (another `jointrig`?): end that one, or go \
-                            through its serial port if there is need of both"
+            "another program holds its vendor interface (another `jointrig`?): end that one, or use \
+                            its serial port if both are needed"
                 .into()
         }
         ErrorKind::Disconnected => {

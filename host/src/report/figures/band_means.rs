@@ -14,7 +14,7 @@ pub fn band_means(results: &Results) -> Option<Figure> {
         "band-means",
         "A.14",
         "Means over two bands",
-        "Mean of k_z by method: thick bars are ± σ over the lines, thin ones go from the smallest to the largest line. Arrows leave the frame.",
+        "Mean of k_z by method: thick bars are ± σ over the lines, thin ones go from the smallest to the largest line. Arrows mark values beyond the frame.",
     )
     .across(2);
     for range in std::iter::once(MAIN_BAND).chain(other) {

@@ -33,7 +33,7 @@ pub fn cells(results: &Results) -> Option<Figure> {
         "cells",
         "",
         "Every cell",
-        "The stronger the square, the more of the hits wanted were kept. A pale one lacks hits, an empty one was never measured.",
+        "The stronger the colour of a square, the more of the hits wanted were kept. A pale square lacks hits, an empty one was not measured.",
     );
     for configuration in Structure::ALL.map(Structure::name) {
         let own: Vec<&CellRow> = all.iter().filter(|c| c.configuration == configuration).collect();
@@ -80,7 +80,7 @@ fn said(cell: &CellRow) -> String {
     let refused =
         if refused.is_empty() { String::new() } else { format!("; refused: {}", refused.join(", ")) };
     format!(
-        "{}, hit at {}, seen at {}: {} of {} kept{refused}",
+        "{}, impact {}, response {}: {} of {} kept{refused}",
         cell.configuration, cell.impact, cell.response, cell.kept, cell.wanted
     )
 }
@@ -188,7 +188,7 @@ pub fn impacts(results: &Results) -> Option<Figure> {
             "impacts",
             "",
             "The slope of every impact",
-            "Every hit that counts, along z on A or on the moving mass. Columns that differ from one another say that the slope depends on where the structure is hit, as no contact's stiffness does.",
+            "Every accepted hit along z on A or on the moving mass. If the columns differ, the slope depends on where the structure is hit; a contact's stiffness does not.",
         )
         .with(panel.with(dots)),
     )

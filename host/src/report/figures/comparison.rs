@@ -41,7 +41,7 @@ pub fn comparison(results: &Results) -> Option<Figure> {
     let say = format!(
         "Mean (point), scatter (bar) and median (stroke) of k_z over the lines of the main band, 300–600 Hz, of the methods that identified a stiffness. {}",
         if failed > 0 {
-            format!("{failed} others did not; the table of methods says why.")
+            format!("{failed} others did not; the table of methods gives the reasons.")
         } else {
             String::new()
         }

@@ -23,7 +23,8 @@ pub fn consistency(results: &Results) -> Option<Figure> {
         "",
         "Consistency of the virtual points",
         format!(
-            "Part of the measured motion (left) and force (right) that the {most} modes hold: 1 for an interface that stays rigid. Reciprocity, hitting here and looking there against the other way round: {}.",
+            "Part of the measured motion (left) and force (right) that the {most} modes describe: 1 for an interface that stays rigid. Reciprocity \
+             (impact and response swapped): {}.",
             reciprocity.join(", ")
         ),
     )
@@ -86,7 +87,7 @@ pub fn interface_modes(results: &Results) -> Option<Figure> {
             "interface-modes",
             "B.15",
             format!("What coupling adds: {} modes suggested", modes.suggested),
-            "Singular values of Y(AJB) − Y(A) − Y(B), the CMIF. As many motions couple the parts as curves stand clear of the rest.",
+            "Singular values of Y(AJB) − Y(A) − Y(B), the CMIF. The number of curves well above the rest is the number of motions that couple the parts.",
         )
         .with(panel.high(Height::Tall).with(Mark::shade(Role::Band, MAIN_BAND)).with_all(lines)),
     )
@@ -103,7 +104,7 @@ pub fn participation(results: &Results) -> Option<Figure> {
     }
     let says = rows.iter().enumerate().flat_map(|(i, parts)| {
         MOTIONS.iter().zip(parts).map(move |(motion, part)| {
-            format!("singular value {}: {motion} takes {:.0} %", i + 1, 100.0 * part)
+            format!("singular value {}: {motion} contributes {:.0} %", i + 1, 100.0 * part)
         })
     });
     let shape = Shape::Cells { values: Packed::of(rows.iter().flatten().copied()), says: says.collect() };
@@ -115,7 +116,7 @@ pub fn participation(results: &Results) -> Option<Figure> {
             "participation",
             "B.15",
             "Which motions couple",
-            "How much each rigid motion of the virtual points takes part in each singular value, mean over the main band: dark is all of it.",
+            "How much each rigid motion of the virtual points contributes to each singular value, mean over the main band: the darkest is 100 %.",
         )
         .across(2)
         .with(Panel::new(Axis::named("motion", motions), Axis::named("", names)).with(mark)),

@@ -27,7 +27,7 @@ pub fn contact_loop(results: &Results) -> Option<Figure> {
         "contact-loop",
         "7",
         format!("One impact at the contact: record {}, hit at {}", curve.record, curve.impact),
-        "Displacements of the specimens (integrated velocity) and the sum of the load cells. The slope of the first cycle holds every mode that the hit excites.",
+        "Displacements of the specimens (integrated velocity) and the sum of the load cells. The slope of the first cycle contains every mode that the hit excites.",
     );
     Some(
         figure
@@ -141,9 +141,11 @@ pub fn decay_loops(results: &Results) -> Option<Figure> {
         "7",
         "The first, third and fourth cycle after one hit",
         if turns {
-            "The loop turns and opens from cycle to cycle, because the modes that the hit excites decay at different rates: only the first cycle lies near the contact's own line."
+            "The loop rotates and opens from cycle to cycle, because the modes that the hit excites decay at different rates: only the first cycle is \
+             close to the contact's own line."
         } else {
-            "The first cycle holds every mode that the hit excites. Those that die away fast leave straight lines behind: no resonance of one specimen turns them."
+            "The first cycle contains every mode that the hit excites. After the fast-decaying modes are gone, the loops are straight lines: no \
+             resonance of one specimen shifts their phase."
         },
     )
     .across(3)
@@ -202,7 +204,7 @@ pub fn loop_parts(results: &Results) -> Option<Figure> {
             "loop-parts",
             "3",
             "A loop and its parts",
-            format!("{} Hz, {}: after each tip the contact sticks first, along its own slope; where it slips, the force stays behind.", short(shown.frequency_hz), words::shape_name(shown.shape)),
+            format!("{} Hz, {}: after each tip the contact sticks first, along its own slope; where it slips, the force falls below that line.", short(shown.frequency_hz), words::shape_name(shown.shape)),
         )
         .across(3)
         .with(parts)
@@ -248,7 +250,7 @@ pub fn rebuilt(results: &Results) -> Option<Figure> {
         "rebuilt",
         "9",
         "The decay put together from two sinusoids",
-        "Both specimens after one hit, and the sum of decaying sinusoids: the mode that all share, and for A the hidden resonance beside it.",
+        "Both specimens after one hit, and the sum of decaying sinusoids: the mode that all share and, for A, the hidden resonance as well.",
     )
     .of_records(vec![[shown.record; 2]]);
     for ((found, field), (again, again_field), role, title) in rows {

@@ -51,7 +51,8 @@ pub fn levels(results: &Results) -> Option<Figure> {
             "levels",
             "5",
             "The shaker's levels",
-            "Round signs are slopes of straight loops between the spots, square ones k_eq of ellipses or of slip; full before the hammer's cells, hollow after them. Bars are ± σ over cycles, with the raw force.",
+            "Circles are slopes of straight loops between the spots, squares are k_eq of elliptical or slipping loops; filled before the hammer's \
+             cells, hollow after them. Bars are ± σ over cycles, with the raw force.",
         )
         .across(2)
         .with(group(by_frequency, &dots, &amplitudes, (|d| d.frequency_hz, "/hysteresis/*/frequency_hz", 1.0), |d| d.micrometres, "µm"))

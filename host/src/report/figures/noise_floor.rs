@@ -78,7 +78,7 @@ pub fn random_error(results: &Results) -> Option<Figure> {
             continue;
         }
         let says = own.iter().map(|(i, e)| {
-            format!("{configuration}, hit at {}, seen at {}: {e:.2} %", cells[*i].impact, cells[*i].response)
+            format!("{configuration}, impact {}, response {}: {e:.2} %", cells[*i].impact, cells[*i].response)
         });
         panel.marks.push(
             Mark::points(Role::group(group), Marker::Ring, own.iter().map(|(i, e)| [*i as f64, *e]))
@@ -129,7 +129,7 @@ fn panel(cells: &Cells, configuration: &str, range: [f64; 2]) -> Option<Panel> {
     let shape = Shape::Strips {
         x: Packed::of(cells.frequency_hz.iter().copied()),
         values: Packed::of(own.iter().flat_map(|c| c.coherence.iter().copied())),
-        says: own.iter().map(|c| format!("{} seen at {}", c.impact, c.response)).collect(),
+        says: own.iter().map(|c| format!("{} measured at {}", c.impact, c.response)).collect(),
     };
     let mark = Mark::new(Role::Refused, shape)
         .named("coherence below 0.99")
@@ -216,7 +216,7 @@ pub fn pulses(results: &Results) -> Option<Figure> {
             "pulses",
             "",
             "The hammer over the campaign",
-            "Peak force of every hit, and the duration of the coil's pulse by which the runner held it. Overloads lie beyond the frame.",
+            "Peak force of every hit, and the duration of the coil's pulse, by which the force is controlled. Overloads lie beyond the frame.",
         )
         .with(peak)
         .with(coil),

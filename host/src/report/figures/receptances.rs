@@ -34,7 +34,8 @@ pub fn receptances(results: &Results) -> Option<Figure> {
         "receptances",
         "",
         "Receptances of A, B and the assembly",
-        "With phase and coherence as far as it is known, at a driving point and across. The main band is shaded yellow; grey, where the hammer's force is more than 6 dB down.",
+        "With phase, and with coherence where it is known, at a driving point and across the interface. The main band is shaded yellow; grey marks \
+         lines at which the hammer's force is more than 6 dB down.",
     )
     .across(configurations.len());
     let has_coherence = indexed().any(|(_, c)| !c.coherence.is_empty());

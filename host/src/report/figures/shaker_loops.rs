@@ -32,7 +32,8 @@ pub fn shaker_loops(results: &Results) -> Option<Figure> {
         "shaker-loops",
         "6",
         "Loops of the shaker",
-        "Averaged over the record's cycles, on the same scales, and both specimens over one cycle. Beside a resonance of one specimen Δx leaves the phase of T, and the line opens to an ellipse.",
+        "Averaged over the record's cycles, on the same scales, and both specimens over one cycle. Near a resonance of one specimen, Δx goes out of \
+         phase with T, and the line opens into an ellipse.",
     )
     .across(picked.len());
     for (i, one) in picked.iter().zip(&shown) {

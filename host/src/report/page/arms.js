@@ -47,7 +47,7 @@ function armsBelow(element){
   if(small||!scene||!scene.bodies.length)return;
   const box=document.createElement('div'),host=document.createElement('div'),words=document.createElement('p');
   box.className='arms';host.className='plot alive';
-  words.textContent='Move over a curve, or over the matrix below: the arms move against one another as its motions take part, signs apart.';
+  words.textContent='Point at a curve, or at the matrix below: the arms move in its motions, each as large as its contribution; signs are not shown.';
   box.append(host,words);
   element.querySelector('.panels').after(box);
   small=new SceneView({title:'The arms'},{marks:[{scene:{bodies:scene.bodies,spots:[]}}]},host,190);

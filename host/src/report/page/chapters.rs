@@ -78,10 +78,7 @@ fn absent(chapter: Chapter, drawn: &Drawn<'_>) -> Vec<String> {
             None => needs.push((entry.needs, vec![entry.title])),
         }
     }
-    needs
-        .iter()
-        .map(|(need, titles)| format!("Not drawn, for want of {need}: {}.", titles.join("; ")))
-        .collect()
+    needs.iter().map(|(need, titles)| format!("Not drawn (needs {need}): {}.", titles.join("; "))).collect()
 }
 
 fn chapter_is_empty(results: &Results, chapter: Chapter, drawn: &Drawn<'_>) -> bool {

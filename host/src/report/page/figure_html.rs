@@ -74,7 +74,7 @@ fn source(html: &mut Html, figure: &Figure) {
     let from = &figure.from;
     let records: Vec<String> =
         from.records.iter().map(|[a, b]| if a == b { a.to_string() } else { format!("{a}–{b}") }).collect();
-    let records = if records.is_empty() { "all that count".into() } else { records.join(", ") };
+    let records = if records.is_empty() { "all accepted ones".into() } else { records.join(", ") };
     html.text(&format!("{}; records: {records}; jointrig {}", from.file, from.version));
     html.raw("</p></details>");
 }

@@ -36,7 +36,7 @@ for(const figure of FIGURES){
   });
   for(const key of['x','y'])if(figure.panels.some(p=>p.marks.some(m=>!m.cells&&!m.scene)&&canSpread(p,key))){
     const panels=figure.panels.filter(p=>canSpread(p,key));
-    const b=button(tools,'log '+key,`${key==='x'?'horizontal':'upright'} axis by logarithm, or even`,()=>{
+    const b=button(tools,'log '+key,`${key==='x'?'horizontal':'vertical'} axis: logarithmic or linear`,()=>{
       const to=panels[0][key].scale==='log'?'linear':'log';
       for(const c of enliven(element,figure))if(c instanceof Chart&&canSpread(c.panel,key)){c.spread(key,to);remember(c)}
       b.setAttribute('aria-pressed',String(to==='log'));
@@ -46,7 +46,7 @@ for(const figure of FIGURES){
   element.querySelector('.say').after(tools);
   for(const item of element.querySelectorAll('.legend li')){
     const b=document.createElement('button');
-    b.type='button';b.title='hide or show; twice: alone';b.setAttribute('aria-pressed','true');
+    b.type='button';b.title='click: hide or show; double click: show alone';b.setAttribute('aria-pressed','true');
     b.append(...item.childNodes);item.append(b);
     b.addEventListener('click',()=>toggle(figure,element,item.dataset.name,false));
     b.addEventListener('dblclick',()=>toggle(figure,element,item.dataset.name,true));
@@ -61,7 +61,7 @@ const near=new IntersectionObserver(entries=>{
 },{rootMargin:'600px'});
 for(const element of document.querySelectorAll('figure[data-figure]'))near.observe(element);
 const repaint=()=>{for(const charts of alive.values())for(const c of charts)if(c.plot)c.plot.redraw()};
-const shown=button(document.getElementById('page-tools'),'light / dark','light, dark, or as the system has it',()=>{
+const shown=button(document.getElementById('page-tools'),'light / dark','light, dark, or as set in the system',()=>{
   const dark=root.dataset.light?root.dataset.light==='dark':matchMedia('(prefers-color-scheme: dark)').matches;
   root.dataset.light=dark?'light':'dark';
   repaint();

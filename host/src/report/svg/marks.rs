@@ -3,7 +3,7 @@
 //! The marker of a single point.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::scene::PanelFrame;
+use super::place::PanelFrame;
 use crate::report::figure::{Along, Bars, Mark, Marker, Packed, Role, Shape};
 
 /// Draws one mark; the caller clips what lies outside the frame.

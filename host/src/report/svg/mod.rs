@@ -3,6 +3,7 @@
 pub mod drawing;
 mod marks;
 mod panel;
+mod place;
 mod scene;
 
 pub use panel::panel;

@@ -1,7 +1,7 @@
 //! One panel as a drawing: frame, grid, ticks, and contents.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::scene::PanelFrame;
+use super::place::PanelFrame;
 use super::{marks, scene};
 use crate::report::figure::{Axis, Height, Panel, Shape};
 use crate::report::scale::{Lie, Scale, Tick};

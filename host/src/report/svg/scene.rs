@@ -1,11 +1,8 @@
 //! A scene in space, seen from one side; the page can rotate it (`page/scene.js` draws the same).
-//!
-//! Maps a panel's values to positions on the drawing.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::marks;
 use crate::report::figure::{Body, Marker, Scene};
-use crate::report::scale::Scale;
 
 /// Initial viewing direction, rad: about the vertical, then down from the horizontal.
 const YAW: f64 = 0.7;
@@ -99,14 +96,4 @@ fn corners_of(body: &Body) -> [[f64; 3]; 8] {
     std::array::from_fn(|i| {
         std::array::from_fn(|axis| if i >> axis & 1 == 1 { body.high[axis] } else { body.low[axis] })
     })
-}
-
-/// A panel with its frame and axes in pixels.
-pub struct PanelFrame {
-    /// The frame.
-    pub area: Area,
-    /// The horizontal axis.
-    pub x: Scale,
-    /// The vertical axis.
-    pub y: Scale,
 }

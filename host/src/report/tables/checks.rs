@@ -119,7 +119,7 @@ pub fn virtual_points(results: &Results) -> Option<String> {
         ]);
     }
     Some(format!(
-        "<p>Condition numbers take rotations at 40 mm; consistency is the part of motion or force that the modes hold (mean over the main \
+        "<p>Condition numbers take rotations at 40 mm; consistency is the part of motion or force that the modes describe (mean over the main \
          band, 1 for a rigid interface); passive lines are those of the worst mode.</p>{}",
         table.finish()
     ))

@@ -42,16 +42,16 @@ pub fn decay(results: &Results) -> Option<String> {
         return None;
     }
     let heads =
-        ["cycle after the hit", "what it tells", "k_eq ± σ over hits, N/µm", "Δx lags T, °", "Δx, µm"];
+        ["cycle after the hit", "what it shows", "k_eq ± σ over hits, N/µm", "Δx lags T, °", "Δx, µm"];
     let mut table =
         HtmlTable::new(2, "The decay's cycles over all hits (the paper's Table 3, impacts)", &heads);
     for (i, step) in steps.iter().enumerate() {
         let k = step.k_eq_n_per_m;
         let at = |field: &str| format!("/hysteresis/{row}/decay/{i}/{field}");
         let tells = if k.std > UNSTEADY * k.mean.abs() {
-            "differs from hit to hit: the decaying modes' phases decide"
+            "differs from hit to hit, with the phases of the decaying modes"
         } else if step.phase_deg.abs() > said::TURNED_DEG {
-            "the loop has turned"
+            "Δx and T are out of phase"
         } else if step.cycle == 1 {
             "nearest to the contact's own line"
         } else {

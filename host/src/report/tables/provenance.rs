@@ -64,7 +64,7 @@ pub fn calibrations(results: &Results) -> Option<String> {
     ];
     let mut table = HtmlTable::new(
         4,
-        "Calibrations entered in the campaign file; the last one of a channel counts",
+        "Calibrations entered in the campaign file; the last one of each channel is used",
         &heads,
     );
     for (i, own) in all.iter().enumerate() {

@@ -20,7 +20,7 @@ pub fn recommended(results: &Results) -> Option<String> {
         "95 % interval",
         "of noise, σ",
         "of positions and angles, σ",
-        "bias taken out",
+        "bias removed",
         "C, N s/m or N m s/rad",
         "",
     ];

@@ -24,12 +24,12 @@ pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
         .collect();
     let beside = match levels {
         0 => String::new(),
-        1 => " A level of the shaker, corrected by the hits, counts beside them.".into(),
-        _ => format!(" {levels} levels of the shaker, corrected by the hits, count beside them."),
+        1 => " A level of the shaker, corrected by the hits, is included as well.".into(),
+        _ => format!(" {levels} levels of the shaker, corrected by the hits, are included as well."),
     };
     format!(
-        "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, whatever the \
-         clamps do.{beside} Most of its uncertainty comes from {}.",
+        "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, independent of \
+         the clamps.{beside} Most of its uncertainty comes from {}.",
         largest.join(" and ")
     )
 }
@@ -37,10 +37,10 @@ pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
 fn of_cause(cause: Cause) -> &'static str {
     match cause {
         Cause::Noise => "noise",
-        Cause::Spots => "where the spots beside the contact are",
-        Cause::SpecimenPoints => "where the points on the specimen are",
-        Cause::ArmPoints => "where the points on arm B are",
-        Cause::Aim => "how well each cell was aimed",
+        Cause::Spots => "the positions of the spots next to the contact",
+        Cause::SpecimenPoints => "the positions of the points on the specimen",
+        Cause::ArmPoints => "the positions of the points on arm B",
+        Cause::Aim => "the aim of the hits in each cell",
         Cause::HammerTilt => "the hammer's tilt",
         Cause::Gains => "gains",
         Cause::Skew => "delays between channels",
@@ -67,18 +67,18 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
             "the points on specimen A do not move as one rigid body (is one misplaced, or does the specimen bend?)"
         }
         Doubt::Spots => {
-            "the spots beside the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
+            "the spots next to the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
         }
         Doubt::Stated => {
             let farthest = diagnosis.farthest.as_ref();
             return farthest.map_or_else(String::new, |far| {
                 format!(
-                    "{} is {:.0} times its stated error from what the plan says (is something misplaced or uncalibrated, or are the plan's [priors] too small?)",
+                    "{} differs from the plan by {:.0} times its stated error (is something misplaced or uncalibrated, or are the plan's [priors] too small?)",
                     far.what, far.deviations
                 )
             });
         }
-        Doubt::Flatness => "the stiffness changes with frequency, as no contact's does",
+        Doubt::Flatness => "the stiffness changes with frequency, which a contact's stiffness does not",
         Doubt::Sides => "hits on A and on the moving mass give different values",
     }
     .to_owned()
@@ -99,7 +99,7 @@ pub fn between_the_arms(basis: Estimate) -> String {
 
 /// Sentence for a slipping contact, which has no k_T.
 pub fn slipping() -> String {
-    "The contact slips under the hammer, so that its stiffness depends on the force: hit more softly, or press harder, for the stuck stiffness.".into()
+    "The contact slips under the hammer, so its stiffness depends on the force: to measure the stuck stiffness, hit more softly or increase the normal load.".into()
 }
 
 /// Sentence if the stiffness between the arms cannot be determined.
@@ -109,7 +109,7 @@ pub fn without_all_three() -> String {
 
 /// Sentence if it was not requested.
 pub fn not_looked_for() -> String {
-    "It was not looked for.".into()
+    "It was not requested.".into()
 }
 
 /// An error message as a sentence.
@@ -127,14 +127,14 @@ pub fn why_they_differ(results: &Results) -> Option<Line> {
     let between = answer.between_arms.k_n_per_m.as_ref()?.mean;
     let Some(clamp) = &answer.clamp else {
         return Some(Line::words(
-            "Nothing soft was found between the arms and the contact, so that both see the same stiffness."
+            "Nothing soft was found between the arms and the contact, so both stiffnesses are the same."
                 .into(),
         ));
     };
     let clamps = clamp.k_n_per_m.mean;
     let [of_clamps, of_contact, of_both] = [clamps, contact, between].map(|k| short(micro(k)));
     let text = format!(
-        "They differ because the clamps ({of_clamps} N/µm) and the contact ({of_contact}) give way one after the other, in series: together {of_both} N/µm are left."
+        "They differ because the clamps ({of_clamps} N/µm) and the contact ({of_contact}) act in series: together they have {of_both} N/µm."
     );
     Some(
         Line::words(text)
@@ -154,7 +154,7 @@ pub fn lines(results: &Results) -> Vec<String> {
     });
     if let Some(clamp) = &answer.clamp {
         lines.push(format!(
-            "The difference is what gives way beside the contact, clamps above all: {} in series with it.",
+            "The difference is due to what lies in series with the contact, mainly the clamps: {}.",
             with_interval(&clamp.k_n_per_m)
         ));
     }

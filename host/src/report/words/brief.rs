@@ -99,7 +99,7 @@ pub fn failed(check: &Check) -> String {
     let at = check.frequency_hz.map_or(String::new(), |f| format!(" at {} Hz", decimals(f, 0)));
     match check.name.as_str() {
         HIDDEN_RESONANCE => format!(
-            "One specimen resonates on its own clamp{at}: loops near it are no measure of the contact."
+            "One specimen resonates on its own clamp{at}: loops near this resonance do not measure the contact."
         ),
         SERIES_COMPLIANCE => {
             "The clamps give way: what is found between the arms is softer than the contact.".into()
@@ -108,10 +108,10 @@ pub fn failed(check: &Check) -> String {
         UNCHANGED => "The contact is not the same after the hits as before.".into(),
         INTERFACE_MODES => "Six rigid motions do not describe what couples the parts.".into(),
         INTERNALS => "The points away from the interface do not suffice for every method.".into(),
-        ONE_STRUCTURE => "The device told of another structure during the campaign.".into(),
+        ONE_STRUCTURE => "The device reported another structure during the campaign.".into(),
         SAME_IN_ALL => "A or B is not the same alone as in the assembly.".into(),
         BACK_COUPLING => {
-            format!("A and B, joined by the stiffness found, do not give the measured assembly{at}.")
+            format!("A and B, joined by the stiffness found, do not reproduce the measured assembly{at}.")
         }
         other => format!("{other} failed."),
     }

@@ -2,9 +2,10 @@
 
 use super::number::{decimals, micro, short};
 use crate::analyse::Findings;
+use crate::analyse::checks::contact_change::ContactChange;
 use crate::analyse::checks::{
-    BackCoupled, ContactChange, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness,
-    SeriesCompliance, Sizes, rigid_motions_suffice,
+    BackCoupled, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness, SeriesCompliance, Sizes,
+    rigid_motions_suffice,
 };
 use crate::hysteresis::compliance::ImaginaryPeak;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
@@ -39,7 +40,8 @@ pub fn all(found: &Findings) -> Vec<Check> {
 /// Records of several structures were combined because the user accepted that.
 fn one_structure(changes: &[String]) -> Option<Check> {
     let meaning = format!(
-        "The campaign went on where the device told of another structure, because --new-structure was given ({}). If it was another one, nothing here is that of either.",
+        "The campaign was continued although the device reported another structure, because --new-structure was given ({}). If the structure really \
+         changed, the results describe neither of the two.",
         changes.join("; ")
     );
     (!changes.is_empty()).then(|| Check::new(ONE_STRUCTURE, Some(false), meaning))
@@ -51,7 +53,7 @@ fn interface_modes(found: &Cmif) -> Check {
     let mut meaning = format!("The CMIF suggests {} modes: {}.", found.suggested, found.reason);
     if enough == Some(false) {
         meaning.push_str(
-            " What six rigid motions leave over is noise or an interface that deforms: look at the virtual points' consistency.",
+            " What six rigid motions do not describe is noise or deformation of the interface: check the virtual points' consistency.",
         );
     }
     let mut check = Check::new(INTERFACE_MODES, Some(enough == Some(true)), meaning)
@@ -106,15 +108,15 @@ fn internals(found: &InternalsFound) -> Check {
 fn same_structures(found: &SameStructures) -> Check {
     let meaning = match found.sameness {
         Sameness::Untold => "Eq. A.1 and A.2 scatter too much to tell whether A and B are the same structures in the assembly as alone.".to_owned(),
-        Sameness::Same => "Eq. A.1, which needs neither A nor B alone, and both blocks of A.2 agree: nothing shows that A or B is another structure in the assembly than alone."
+        Sameness::Same => "Eq. A.1, which needs neither A nor B alone, and both blocks of A.2 agree: there is no sign that A or B is different in the assembly."
             .to_owned(),
         Sameness::Changed(changed) => {
             let sides = found.differences_n_per_m.iter().zip(changed).filter(|(_, changed)| *changed);
             let sides: Vec<String> =
                 sides.map(|((side, by), _)| format!("{side} (by {} N/µm)", short(micro(*by)))).collect();
             format!(
-                "Eq. A.2 differs from A.1 for {}: that substructure is not the same alone as in the assembly. Methods that use it (Eq. 3, A.3, its block of A.2) see the \
-                 difference as joint; A.1 and the other block of A.2 do not.",
+                "Eq. A.2 differs from A.1 for {}: that substructure is not the same alone as in the assembly. Methods that use it (Eq. 3, A.3, its \
+                 block of A.2) attribute the difference to the joint; A.1 and the other block of A.2 do not.",
                 sides.join(" and ")
             )
         }
@@ -136,30 +138,30 @@ fn back_coupled(found: &BackCoupled) -> Check {
     );
     let coupled = "A and B, coupled by the joint of Eq. A.1 (its mean over the main band)";
     let meaning = match found.reach {
-        Reach::Untold => format!("Whether {coupled}, are the measured assembly cannot be told: {sizes}."),
+        Reach::Untold => format!("It is unknown if {coupled}, reproduce the measured assembly: {sizes}."),
         Reach::Doubtful => format!(
-            "{coupled}, give the measured assembly no worse than {} times what noise and errors of position explain ({sizes}): too little to call it another path, too \
-             much to exclude one.",
+            "{coupled}, reproduce the measured assembly no worse than {} times what noise and errors of position explain ({sizes}): too little to \
+             conclude that there is another path, too much to exclude one.",
             short(BEYOND)
         ),
         Reach::Whole([from, to]) => format!(
-            "{coupled}, give the measured assembly from {} to {} Hz: {sizes}. Nothing shows another path between A and B.",
+            "{coupled}, reproduce the measured assembly from {} to {} Hz: {sizes}. There is no sign of another path between A and B.",
             short(from),
             short(to)
         ),
         Reach::UpTo(to) => format!(
-            "{coupled}, give the measured assembly up to {} Hz ({sizes}), but not above: another path couples A and B there (springs or a foundation that \
-             both stand on), or the joint has a mass. Use no lines above it.",
+            "{coupled}, reproduce the measured assembly up to {} Hz ({sizes}), but not above: another path couples A and B there (springs or a \
+             foundation that supports both), or the joint has a mass. Use no lines above it.",
             short(to)
         ),
         Reach::Within([from, to]) => format!(
-            "{coupled}, give the measured assembly only from {} to {} Hz: {sizes}. Elsewhere a single stiffness does not describe what was measured: A or B changed, \
-             another path couples them, or the joint is no spring and damper.",
+            "{coupled}, reproduce the measured assembly only from {} to {} Hz: {sizes}. Elsewhere a single stiffness does not describe what was measured: A or B changed, \
+             another path couples them, or the joint is not a spring and damper.",
             short(from),
             short(to)
         ),
         Reach::Nowhere => format!(
-            "{coupled}, do not give the measured assembly: {sizes}. The joint is no spring and damper, A or B changed between the configurations, \
+            "{coupled}, do not reproduce the measured assembly: {sizes}. The joint is not a spring and damper, A or B changed between the configurations, \
              or another path couples them."
         ),
     };
@@ -179,8 +181,7 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
     };
     match found {
         SeriesCompliance::NotBoth => check(
-            "FBS and loops are both needed to tell whether clamp and contact are in series; only one of them is here. An FBS value \
-             taken on the arms holds the clamps too."
+            "FBS and loops are both needed to tell whether clamp and contact are in series; only one of them is available. An FBS value measured on the arms includes the clamps."
                 .into(),
         ),
         SeriesCompliance::NotIdentified => check(
@@ -190,7 +191,7 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
             let [loops, fbs] = both(sizes);
             let [series, low, high] = found.between_n_per_m().unwrap_or([f64::NAN; 3]);
             let meaning = format!(
-                "Between the laser spots it is {} times stiffer than between the arms, where FBS looks ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
+                "Between the laser spots it is {} times stiffer than between the arms, where FBS measures ({loops} against {fbs} N/µm). Clamp and contact are in series, and the clamp gives way: \
                  the FBS value is not k_T. What lies between arms and contact has about {} N/µm by itself \
                  (95 % {}…{}).",
                 short(sizes.ratio()),
@@ -208,15 +209,15 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
         SeriesCompliance::Softer(sizes) => {
             let [loops, fbs] = both(sizes);
             with(sizes, check(format!(
-                "Between the laser spots it is softer than between the arms, where FBS looks ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
+                "Between the laser spots it is softer than between the arms, where FBS measures ({loops} against {fbs} N/µm): no series compliance explains that. Look at the loops' shape \
                  and at the FBS methods' agreement first."
             )))
         }
         SeriesCompliance::SameSize(sizes) => {
             let [loops, fbs] = both(sizes);
             with(sizes, check(format!(
-                "Between the arms, where FBS looks, and between the laser spots the stiffness is of one size ({fbs} and {loops} N/µm): nothing much softer than the contact shows between \
-                 them. Neither is the contact's own."
+                "Between the arms, where FBS measures, and between the laser spots the stiffness is about the same ({fbs} and {loops} N/µm): there is no \
+                 sign of anything much softer than the contact between them. Neither value is the contact's own."
             )))
         }
     }
@@ -226,13 +227,13 @@ fn series_compliance(found: &SeriesCompliance) -> Check {
 pub fn hammer_slip(found: &HammerSlip) -> Check {
     let meaning = match found {
         HammerSlip::Slips(scaling) => format!(
-            "The contact slips under the hammer: what it answers per newton depends on how hard it is hit: 1 % more force changes T per newton by \
-             {} %, which {}. What the hits say of stiffness is no k_T: hit more gently, or load the contact more.",
+            "The contact slips under the hammer: its response per newton depends on how hard it is hit. 1 % more force changes T per newton by \
+             {} %, which {}. The stiffness from the hits is not k_T: hit more gently, or load the contact more.",
             short(scaling.change_per_force),
             if scaling.chance < 1e-6 {
-                "is no accident".into()
+                "is not due to chance".into()
             } else {
-                format!("one stuck campaign of {:.0} would show by chance", scaling.chance.recip())
+                format!("a sticking contact shows once in {:.0} campaigns by chance", scaling.chance.recip())
             }
         ),
         HammerSlip::Sticks(scaling) => format!(
@@ -244,10 +245,10 @@ pub fn hammer_slip(found: &HammerSlip) -> Check {
             short(scaling.std)
         ),
         HammerSlip::CannotTell(Unclear::TooFewHits { differences, needed }) => format!(
-            "Whether the contact slips under the hammer cannot be told: {differences} hits can be compared with another one of their cell, {needed} are needed."
+            "It cannot be determined whether the contact slips under the hammer: {differences} hits can be compared with another hit of their cell, {needed} are needed."
         ),
         HammerSlip::CannotTell(Unclear::TooAlike { force_scatter, .. }) => format!(
-            "Whether the contact slips under the hammer cannot be told: the hits of a cell differ by only {} % in force. Vary the coil's pulse by some per cent.",
+            "It cannot be determined whether the contact slips under the hammer: the hits of a cell differ by only {} % in force. Vary the coil's pulse by some per cent.",
             short(100.0 * force_scatter)
         ),
     };
@@ -268,17 +269,17 @@ fn hidden_resonance(found: &HiddenResonance) -> Check {
     let over = |peak: &ImaginaryPeak, check: Check| check.with("peak_over_level", peak.over_level);
     match found {
         HiddenResonance::NoSignals => check(
-            "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for it.".into(),
+            "Hits along z on A with both specimens' vibrometers and the load cells are needed to look for a hidden resonance.".into(),
         ),
-        HiddenResonance::TooFewLines => check("Too few lines between 100 and 400 Hz to look for it.".into()),
+        HiddenResonance::TooFewLines => check("Too few lines between 100 and 400 Hz to look for a hidden resonance.".into()),
         HiddenResonance::Quiet(peak) => over(
             peak,
-            check("Both specimens move in phase with the force between 100 and 400 Hz: no resonance hides there.".into()),
+            check("Both specimens move in phase with the force between 100 and 400 Hz: there is no hidden resonance.".into()),
         ),
         HiddenResonance::Unclear(peak) => over(
             peak,
             check(format!(
-                "There is some phase between the specimens near {} Hz, but it does not stand out enough from the noise to call it a resonance.",
+                "There is some phase difference between the specimens near {} Hz, but it does not stand out enough from the noise to call it a resonance.",
                 short(peak.frequency_hz)
             ))
             .at(peak.frequency_hz),
@@ -324,12 +325,12 @@ fn contact_change(found: &ContactChange) -> Check {
     let where_most = format!("most at {worst_at}: {} %", short(100.0 * worst));
     let meaning = if *beyond == 0 {
         format!(
-            "{pairs} levels of the shaker read the same before and after the hammer's cells ({where_most}): the contact did not change."
+            "{pairs} levels of the shaker gave the same values before and after the hammer's cells ({where_most}): the contact did not change."
         )
     } else {
         format!(
-            "{beyond} of {pairs} levels of the shaker read otherwise after the hammer's cells than before ({where_most}): the contact has \
-             changed while it was measured, and FBS mixes both states."
+            "{beyond} of {pairs} levels of the shaker gave other values after the hammer's cells than before ({where_most}): the contact changed \
+             during the measurement, and FBS mixes both states."
         )
     };
     Check::new(UNCHANGED, Some(*beyond == 0), meaning)
@@ -379,7 +380,7 @@ mod tests {
         let path = of(Reach::UpTo(699.0));
         assert_eq!((path.ok, path.frequency_hz), (Some(false), Some(699.0)));
         assert!(path.meaning.contains("Use no lines above"), "{}", path.meaning);
-        assert!(of(Reach::Nowhere).meaning.contains("do not give"));
+        assert!(of(Reach::Nowhere).meaning.contains("do not reproduce"));
         assert_eq!(of(Reach::Doubtful).values["median_explained"], 0.06);
     }
 

@@ -13,7 +13,7 @@ use crate::results::{BESIDE_THE_CONTACT, Excitation, Force, Hysteresis, Results,
 /// that is not due to the contact.
 pub fn corrected(shares: &Shares, correction: f64) -> String {
     let mut causes = [
-        (shares.fit, "what the hits tell of spots, points, gains and force"),
+        (shares.fit, "the hits' estimates of spots, points, gains and force"),
         (shares.hammer_gain, "the gain of the hammer's force cell"),
         (shares.turning, "noise of the specimens' rotation at this frequency"),
         (shares.place, "where the shaker pushes"),
@@ -21,7 +21,7 @@ pub fn corrected(shares: &Shares, correction: f64) -> String {
     ];
     causes.sort_by(|a, b| b.0.total_cmp(&a.0));
     format!(
-        "Force and Δx are those at the contact, by the specimens' rotation from the hits: {} % of T/Δx at the spots was not the contact's. Most of its \
+        "Force and Δx were corrected to those at the contact, with the specimens' rotation from the hits: {} % of T/Δx at the spots was not due to the contact. Most of its \
          uncertainty comes from {} ({:.1} %).",
         short(100.0 * correction),
         causes[0].1,
@@ -33,12 +33,12 @@ pub fn corrected(shares: &Shares, correction: f64) -> String {
 pub fn none(why: &NoLevelStiffness) -> String {
     let reason = match why {
         NoLevelStiffness::NoContact => {
-            "the hits do not tell the specimens' rotation and the force at the contact: see answer.contact"
+            "the hits do not determine the specimens' rotation and the force at the contact: see answer.contact"
                 .into()
         }
-        NoLevelStiffness::Doubted => "what it would be corrected by is in doubt: see answer.contact".into(),
+        NoLevelStiffness::Doubted => "the result of the hits, which is needed for its correction, is doubtful: see answer.contact".into(),
         NoLevelStiffness::SlipsUnderTheHammer => {
-            "the contact slips under the hammer, so that hits do not tell how it sticks".into()
+            "the contact slips under the hammer, so the hits do not describe the stuck contact".into()
         }
         NoLevelStiffness::Slips => {
             format!("the loop slips ({} or {})", shape_name(Shape::Microslip), shape_name(Shape::GrossSlip))
@@ -46,11 +46,11 @@ pub fn none(why: &NoLevelStiffness) -> String {
         NoLevelStiffness::Finding(finding) => loop_finding(finding),
         NoLevelStiffness::Level(error) => error.to_string(),
         NoLevelStiffness::Apart(deviations) => format!(
-            "it is {} standard deviations from what the hits say: see answer.contact",
+            "it is {} standard deviations from the result of the hits: see answer.contact",
             short(*deviations)
         ),
         NoLevelStiffness::Wide(half) => format!(
-            "the specimens' rotation makes so much of Δx here that k_T is known to ± {} % only",
+            "so much of Δx at this frequency comes from the specimens' rotation that k_T is known only to ± {} %",
             short(100.0 * half)
         ),
     };
@@ -127,7 +127,7 @@ fn of_row(row: &Hysteresis, beside: bool) -> Vec<String> {
 fn in_words(shape: Shape) -> &'static str {
     match shape {
         Shape::Stuck => "a straight line",
-        Shape::Elliptical => "an ellipse in which no slip is seen",
+        Shape::Elliptical => "an ellipse without visible slip",
         Shape::Microslip => "a part of the contact slips, or the loop bends",
         Shape::GrossSlip => "all of the contact slips",
     }

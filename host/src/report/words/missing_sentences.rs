@@ -35,11 +35,11 @@ pub fn sentence(missing: &Missing) -> String {
         }
         Missing::ImportUnreadable { configuration, told } => format!("{configuration}: {told}."),
         Missing::ImportUnused { configuration, file, cells: own } => format!(
-            "{configuration}: the FRFs imported from {file} are not used, because {} with hits of their own count.",
+            "{configuration}: the FRFs imported from {file} are not used, because {} with measured hits take precedence.",
             cells(*own)
         ),
         Missing::OtherLines(cell) => {
-            of_cell(cell, "its signals at the contact have other lines than the other cells' and do not count there")
+            of_cell(cell, "the lines of its signals at the contact differ from those of the other cells, so they are not used")
         }
         Missing::Configurations(absent) => {
             let names: Vec<&str> = absent.iter().map(|structure| structure.name()).collect();

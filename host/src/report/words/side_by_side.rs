@@ -46,10 +46,10 @@ fn substructuring(results: &Results) -> Vec<Kind> {
     let series = results.check(SERIES_COMPLIANCE).and_then(|c| c.ok);
     let what = match series {
         Some(false) => {
-            "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; for models that have no clamps"
+            "stiffness between the arms: contact and clamps in series. A property of this structure, not of the contact; use it in models without clamps"
         }
         Some(true) => {
-            "stiffness between the arms: nothing soft was found between them and the contact, whose own stiffness is the answer's"
+            "stiffness between the arms: nothing soft was found between them and the contact; the answer gives the contact's own stiffness"
         }
         None => "stiffness between the arms: contact and clamps in series",
     };
@@ -70,10 +70,10 @@ fn substructuring(results: &Results) -> Vec<Kind> {
         let meaning = match (kinds.is_empty(), joint.method == fit::NAME) {
             (true, _) => what,
             (false, true) => {
-                "the same by maximum likelihood over all cells; needs A and B alone to be what they are in the assembly"
+                "the same by maximum likelihood over all cells; valid only if A and B are the same alone as in the assembly"
             }
             (false, false) => {
-                "the same line by line: ± is the scatter of the lines, no uncertainty of the joint"
+                "the same line by line: ± is the scatter of the lines, not the uncertainty of the joint"
             }
         };
         kinds.push(Kind {
@@ -93,7 +93,7 @@ fn direct(results: &Results) -> Option<Kind> {
         found: format!("T/Δx of the impacts, {}", band(joint.band_hz)),
         mean_n_per_m: k.mean,
         std_n_per_m: k.std,
-        meaning: "stiffness between the two laser spots with the raw force, away from local resonances: holds the specimen's tilt and lacks arm B's inertia".into(),
+        meaning: "stiffness between the two laser spots with the raw force, away from local resonances: includes the specimen's tilt, but not arm B's inertia".into(),
     })
 }
 
@@ -143,7 +143,7 @@ fn meaning(row: &Hysteresis, results: &Results) -> String {
             "a straight loop: what lies between the spots, contact and specimens' tilt".into()
         }
         (Shape::Elliptical, Some(f)) => format!(
-            "an ellipse beside the resonance at {} Hz: an equivalent stiffness of this structure at this frequency, no contact stiffness",
+            "an ellipse near the resonance at {} Hz: an equivalent stiffness of this structure at this frequency, no contact stiffness",
             short(f)
         ),
         (Shape::Elliptical, None) => {
@@ -172,9 +172,9 @@ fn impacts(results: &Results) -> Vec<Kind> {
             mean_n_per_m: k.mean,
             std_n_per_m: k.std,
             meaning: if straight {
-                "all modes at once, but none of them between the spots: contact and specimens' tilt".into()
+                "contains all modes, but none of them lies between the spots: contact and specimens' tilt".into()
             } else {
-                "all modes at once, the local one of a specimen too: near the contact's stiffness, but not it"
+                "contains all modes, including the local one of a specimen: near the contact's stiffness, but not equal to it"
                     .into()
             },
         });
@@ -185,7 +185,7 @@ fn impacts(results: &Results) -> Vec<Kind> {
             mean_n_per_m: step.k_eq_n_per_m.mean,
             std_n_per_m: step.k_eq_n_per_m.std,
             meaning: format!(
-                "Δx lags T by {}° on the average: depends on the phase of the decaying modes, linked to no frequency",
+                "Δx lags T by {}° on average: depends on the phase of the decaying modes and belongs to no single frequency",
                 decimals(step.phase_deg, 0)
             ),
         });
@@ -206,7 +206,7 @@ fn pooled(slopes: &[OverCycles]) -> Option<(f64, f64)> {
 pub fn verdict(told: Option<&Difference>) -> String {
     told.map_or_else(
         || {
-            "Nothing tells whether the contacts differ: neither k_T nor the stiffness between the arms is known in both."
+            "It cannot be decided whether the contacts differ: neither k_T nor the stiffness between the arms is known in both."
                 .into()
         },
         of_difference,
@@ -236,7 +236,7 @@ fn of_difference(d: &Difference) -> String {
         )
     } else {
         format!(
-            "They do not differ as far as this measurement tells: {}, second minus first is {:.1} N/µm (95 % {:.1}…{:.1}).",
+            "They do not differ within the uncertainty of this measurement: {}, second minus first is {:.1} N/µm (95 % {:.1}…{:.1}).",
             d.quantity,
             micro(mean),
             micro(low),

@@ -50,7 +50,7 @@ fn by_one_method(results: &Results) -> Option<String> {
 pub fn bootstrapped(bootstrap: &Bootstrap) -> String {
     let z = bootstrap.hits.get(&Dof::Z).zip(bootstrap.joint.get(&Dof::Z));
     let said = z.map_or_else(
-        || "k_z was not among them".to_owned(),
+        || "k_z was not included".to_owned(),
         |(hits, whole)| {
             let high = if whole.identified { short(micro(whole.ci95[1])) } else { "no upper limit".into() };
             format!(
@@ -61,7 +61,7 @@ pub fn bootstrapped(bootstrap: &Bootstrap) -> String {
         },
     );
     format!(
-        "Hits drawn anew {} times ({}): {said}.",
+        "Hits resampled {} times ({}): {said}.",
         count(bootstrap.replicates as u64),
         band(bootstrap.band_hz)
     )
@@ -198,7 +198,7 @@ pub fn summary(results: &Results) -> Vec<String> {
         lines.push("Joint stiffness along z, by method, interface modes and band:".into());
         lines.extend(table);
         if results.joint.iter().any(|j| !read_here(&j)) {
-            lines.push("  (the other bands stand in results.json and report.html)".into());
+            lines.push("  (the other bands are in results.json and report.html)".into());
         }
     }
     let kinds = side_by_side::kinds(results);

@@ -12,7 +12,7 @@ const LOUD: f64 = 0.3;
 pub fn loud_noise(median: f64, noise: f64) -> Option<String> {
     (noise > LOUD * median.abs()).then(|| {
         format!(
-            "noise alone moves k_z of a line by {:.1} N/µm (median): {:.0} % of what the lines say",
+            "noise alone shifts k_z of a line by {:.1} N/µm (median): {:.0} % of the value of the lines",
             noise * 1e-6,
             100.0 * noise / median.abs()
         )
@@ -22,7 +22,7 @@ pub fn loud_noise(median: f64, noise: f64) -> Option<String> {
 /// What T/Δx measures, and what it does not.
 pub fn direct(found: &Direct) -> Vec<String> {
     let mut warnings = vec![
-        "T is the load cells' sum, not the force at the contact: the static arm's inertia adds some per cent, growing with the frequency's square".to_owned(),
+        "T is the load cells' sum, not the force at the contact: the static arm's inertia adds a few per cent, increasing with the square of the frequency".to_owned(),
     ];
     if found.is_drowned() {
         warnings.push("Δx is buried in noise here: no stiffness can be read from it".to_owned());
@@ -33,7 +33,7 @@ pub fn direct(found: &Direct) -> Vec<String> {
 /// What the slope of first cycles measures, and what it may be called.
 pub fn impact_loops(found: &ImpactLoops) -> Vec<String> {
     let mut warnings = vec![
-        "Slope over the first cycle of a decay: every mode that the hit excites is in it, also the specimen's tilt on its clamp.".to_owned(),
+        "Slope over the first cycle of a decay: it contains every mode that the hit excites, including the specimen's tilt on its clamp.".to_owned(),
     ];
     if found.open > 0 {
         warnings.push(format!(
@@ -52,10 +52,10 @@ pub fn impact_loops(found: &ImpactLoops) -> Vec<String> {
             short(f)
         )),
         SlopeIs::Slipping => warnings.push(
-            "This slope is k_eq, not k_T: the contact slips under the hammer, so that it goes with the force.".into(),
+            "This slope is k_eq, not k_T: the contact slips under the hammer, so it depends on the force.".into(),
         ),
         SlopeIs::Undecided => warnings.push(
-            "This slope is called k_eq: whether a resonance of one specimen is in it cannot be told from these records.".into(),
+            "This slope is called k_eq, because these records do not show whether it contains a resonance of one specimen.".into(),
         ),
     }
     warnings
@@ -76,26 +76,30 @@ pub fn loop_finding(found: &LoopFinding) -> String {
     let micros = |s: f64| short(1e6 * s);
     match *found {
         LoopFinding::ReversedForce { k_eq_n_per_m, .. } => format!(
-            "the force falls while the contact is pushed ({} N/µm) and the loop takes no energy: the force's sign is wrong, or the signals of A and B are swapped; no k_T is given",
+            "the force falls while the contact is pushed ({} N/µm) and the loop dissipates no energy: the force's sign is wrong, or the signals of A \
+             and B are swapped; no k_T is given",
             short(micro(k_eq_n_per_m))
         ),
         LoopFinding::LateForce { by_s, at_least: true, .. } => format!(
-            "the loop gives energy instead of taking it: the force comes at least {} µs later than the motion, or something between the spots resonates; check the channels' delays",
+            "the loop generates energy instead of dissipating it: the force comes at least {} µs later than the motion, or something between the \
+             spots resonates; check the channels' delays",
             micros(by_s)
         ),
         LoopFinding::LateForce { by_s, std_s, corrected: true, .. } => format!(
-            "the force comes {} ± {} µs {} than the motion; it was put in step before k_T, friction and energy were read; check the channels' delays",
+            "the force comes {} ± {} µs {} than the motion; it was put in step before k_T, friction and energy were determined; check the channels' delays",
             micros(by_s.abs()),
             micros(std_s),
             if by_s < 0.0 { "earlier" } else { "later" }
         ),
         LoopFinding::LateForce { by_s, .. } => format!(
-            "the force is out of step with the motion, as if it came some {} µs {}, but it was not put right: no delay makes a friction loop of this one, or damping beside the friction explains it as well; no k_T or friction limit is given, and energy and k_eq are those of the loop as it is; check the channels' delays",
+            "the force is out of step with the motion, as if it came about {} µs {}, but it was not corrected: no delay turns this into a friction \
+             loop, or damping in addition to the friction explains it as well; no k_T or friction limit is given, and energy and k_eq are those of \
+             the uncorrected loop; check the channels' delays",
             micros(by_s.abs()),
             if by_s < 0.0 { "earlier" } else { "later" }
         ),
         LoopFinding::Play { size_m, std_m } => format!(
-            "the contact has play: after each reversal it moves by {} while the force stays; look for backlash in the drive, the pins or the clamps",
+            "the contact has play: after each reversal it moves by {} while the force stays constant; look for backlash in the drive, the pins or the clamps",
             length(size_m, std_m)
         ),
         LoopFinding::Unsteady { left_out_first, left_out_last, used, amplitude_m, left_out_amplitude_m } => {
@@ -105,19 +109,19 @@ pub fn loop_finding(found: &LoopFinding) -> String {
                 (first, last) => format!("the first {} and the last {}", cycles(first), cycles(last)),
             };
             format!(
-                "the record is not steady: {place} differ from the others (amplitude of Δx {} against {}) and were left out; all figures are those of the {} between",
+                "the record is not steady: {place} differ from the others (amplitude of Δx {} against {}) and were left out; all figures are those of the {} in between",
                 prefixed(left_out_amplitude_m, "m"),
                 prefixed(amplitude_m, "m"),
                 cycles(used)
             )
         }
         LoopFinding::Viscous { viscous_n_s_per_m, force_n, .. } => format!(
-            "beside the friction a force goes with the velocity ({} N s/m, up to {} N): it was taken out before k_T and μN were read",
+            "a force proportional to the velocity ({} N s/m, up to {} N) acts in addition to the friction: it was removed before k_T and μN were determined",
             short(viscous_n_s_per_m),
             short(force_n)
         ),
         LoopFinding::Hum { mains_hz, at_hz, part } => format!(
-            "the mains ({} Hz) hum in these signals, and one of their multiples ({} Hz) is the loop's own frequency: the slope may be {} % off; measure some hertz beside it",
+            "these signals contain mains hum ({} Hz), and one of its multiples ({} Hz) is the loop's own frequency: the slope may be {} % off; measure a few hertz away from it",
             short(mains_hz),
             short(at_hz),
             short(100.0 * part)
@@ -133,15 +137,15 @@ pub fn loop_finding(found: &LoopFinding) -> String {
             let at = if from == to { format!("at {from}") } else { format!("from {from} to {to}") };
             format!("the excitation runs {at} Hz{stated}: the cycles were cut at the frequency found")
         }
-        _ => "something else is the matter with this loop: see its findings".into(),
+        _ => "this loop has another fault: see its findings".into(),
     }
 }
 
 /// The effect of a resonance of one specimen on a loop that still looks stuck.
 pub fn beside_resonance(frequency_hz: f64, resonance_hz: f64) -> String {
-    let (way, effect) = if frequency_hz < resonance_hz { ("adds to", "low") } else { ("takes from", "high") };
+    let (way, effect) = if frequency_hz < resonance_hz { ("adds to", "low") } else { ("reduces", "high") };
     format!(
-        "a resonance of one specimen at {} Hz {way} Δx here: this slope reads {effect}, by more the nearer it is",
+        "a resonance of one specimen at {} Hz {way} Δx here: this slope reads {effect}, and the error grows towards the resonance",
         short(resonance_hz)
     )
 }
@@ -150,7 +154,7 @@ pub fn beside_resonance(frequency_hz: f64, resonance_hz: f64) -> String {
 pub fn no_fit(why: &NoFit) -> String {
     match why {
         NoFit::ImportWithoutVariance => {
-            "it needs the variance of A, B and AJB, and FRFs from elsewhere came without".into()
+            "it needs the variance of A, B and AJB, and the imported FRFs have none".into()
         }
         NoFit::FileWithoutVariance(name) => format!(
             "{name} has no array `variance`, and `fit` weighs every cell with its noise: store it (`jointrig frf --out` does), or state --noise FRACTION"

@@ -40,7 +40,7 @@ impl Judge for ByShotSummary {
             // a single code at the end of the range may be chance, two are a flat top
             if touched > 1 {
                 let name = channels.channels.get(place).map_or("?", |channel| channel.name.as_str());
-                let sentence = format!("channel {name} stands at the end of its range for {touched} samples");
+                let sentence = format!("channel {name} is at the end of its range for {touched} samples");
                 return judged(Verdict::Overload, touched as f64, 1.0, sentence);
             }
         }

@@ -25,7 +25,7 @@ use jointrig_protocol::shot::{Phase, Shot};
 use jointrig_protocol::slow::Slow;
 use jointrig_protocol::sync::Sync;
 
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 
 pub const RING: u32 = 8_192;
 pub const RATE: u32 = 51_200;

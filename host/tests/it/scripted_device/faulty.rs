@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::Duration;
 
-use jointrig::device::address::Transport;
+use jointrig::device::transport::Transport;
 
 /// Fraction of the frames affected by each fault, 0 to 1, in each direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -8,9 +8,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use jointrig::campaign::store::Store;
-use jointrig::device::address::Transport;
 use jointrig::device::error::DeviceError;
 use jointrig::device::session::Session;
+use jointrig::device::transport::Transport;
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::COIL_PULSE_CAP_US;
 
@@ -45,7 +45,7 @@ fn scales_that_are_no_numbers_cost_no_shot() {
         (|fake| fake.channel = |channel| channel.units_per_volt = f32::INFINITY, "units per volt"),
         (|fake| fake.channel = |channel| channel.range_v = 0.0, "a range of"),
         (|fake| fake.channel = |channel| channel.range_v = f32::NAN, "a range of"),
-        (|fake| fake.channel = |channel| channel.name = "one".parse().unwrap(), "a name of its own"),
+        (|fake| fake.channel = |channel| channel.name = "one".parse().unwrap(), "its own name"),
         (|fake| fake.info = |info| info.scan_rate_hz = 0, "scans a second"),
         (|fake| fake.info = |info| info.coil_cap_us = COIL_PULSE_CAP_US + 1, "its coil"),
     ];

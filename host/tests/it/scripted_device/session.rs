@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use crate::scripted_device::fake::{Fake, RING};
 use crate::scripted_device::faulty::{Faults, Faulty};
-use jointrig::device::address::Transport;
 use jointrig::device::logs::Tables;
 use jointrig::device::session::Session;
 use jointrig::device::stream::Accounts;
+use jointrig::device::transport::Transport;
 use jointrig_logs::example::{WARNING, image, line};
 use jointrig_logs::file_name;
 use jointrig_protocol::hello::Hello;

@@ -11,7 +11,7 @@ use core::hint::black_box;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
-use jointrig_firmware::ad7606b::alignment::{Moment, SCAN_WORDS};
+use jointrig_firmware::ad7606b::reader::{Moment, SCAN_WORDS};
 use jointrig_firmware::lockstep::{
     Ask, BLOCK_AT, CLOCK, DELIVERY_BYTES, Delivery, INTERLOCK_CLOSED, Op, RING_BLOCKS, RING_BYTES, Reply,
     Setup, TO_DEVICE_AT, to_text,

@@ -160,7 +160,7 @@ impl Prepared {
                     return Err(AveragedError::Hits { reason });
                 }
                 let missing = |name: &str| AveragedError::Hits {
-                    reason: format!("{name} is no cell of the interface"),
+                    reason: format!("{name} is not a cell of the interface"),
                 };
                 let column = self
                     .assembly

@@ -99,7 +99,7 @@ pub enum AveragedError {
     },
     /// Modes for which errors of position are not propagated.
     #[error(
-        "an estimate with an interval is made of rigid interface modes only, not of {0}: errors of position are not propagated for flexible ones"
+        "an estimate with an interval is possible for rigid interface modes only, not for {0}: errors of position are not propagated for flexible modes"
     )]
     Flexible(Dof),
     /// Spectra of hits that do not match the FRFs.
@@ -167,7 +167,7 @@ impl Averaged {
         let origin = if self.noise_known {
             ""
         } else {
-            " (the FRFs came without their variance, so the interval holds errors of position and angle only)"
+            " (the FRFs came without their variance, so the interval covers errors of position and angle only)"
         };
         Some(if z.identified {
             format!(
@@ -178,7 +178,7 @@ impl Averaged {
             )
         } else {
             format!(
-                "not identified: the noise exceeds the joint's admittance; the data only say that k_z is above {:.1} N/µm{origin}.",
+                "not identified: the noise exceeds the joint's admittance; the data only show that k_z is above {:.1} N/µm{origin}.",
                 micro(z.ci95[0])
             )
         })

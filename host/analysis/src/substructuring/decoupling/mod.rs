@@ -38,7 +38,7 @@ pub enum DecouplingError {
     /// The least-squares form needs at least n_c internal degrees of freedom on both sides.
     #[error(
         "{impacts} internal impacts and {responses} internal responses, but {needed} interface DoFs: with fewer internals than \
-         interface DoFs the joint is seen only through the forces they generate (biased); measure more, or use fewer IDMs"
+         interface DoFs the joint is seen only through the forces they generate (biased); measure more points, or use fewer IDMs"
     )]
     TooFewInternals {
         /// Internal impacts (on A for Eq. 3).

@@ -24,6 +24,7 @@ mod nuisance;
 mod outcome;
 mod problem;
 mod solver;
+mod start;
 mod weight;
 
 pub use chart::FreeEntries;
@@ -139,7 +140,7 @@ pub enum FitError {
     },
     /// The covariance of the noise cannot be factorised.
     #[error(
-        "the residuals' covariance is singular: two channels or impacts say the same, or variances differ by more than rounding bears"
+        "the residuals' covariance is singular: two channels or impacts are the same, or the variances differ by too many orders of magnitude"
     )]
     NoiseSingular,
     /// The cost has no clear minimum.
@@ -211,9 +212,9 @@ pub fn fit(
     options: &Options,
 ) -> Result<Fitted, FitError> {
     let problem = problem(a, b, ajb, geometry, idms, band, options)?;
-    let chart = model::chart(&problem);
+    let chart = start::chart(&problem);
     let mut best: Option<solver::SearchResult> = None;
-    for candidate in model::candidates(&problem, &chart, idms) {
+    for candidate in start::candidates(&problem, &chart, idms) {
         let found = match solver::search(&problem, &chart, &candidate) {
             Ok(found) => found,
             // another start may succeed

@@ -53,7 +53,7 @@ struct Crossed<'a> {
 impl WithSimd for Crossed<'_> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         // as many sums as the registers hold together with their operands
@@ -63,7 +63,7 @@ impl WithSimd for Crossed<'_> {
 
 impl Crossed<'_> {
     /// I columns of A with J of B at a time.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn by<S: Simd, const I: usize, const J: usize>(self, simd: S) {
         let Crossed { a, b, height, out } = self;
@@ -82,7 +82,7 @@ impl Crossed<'_> {
 }
 
 /// I columns with all of `b`.
-#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[inline(always)]
 fn crossed_with<S: Simd, const I: usize, const J: usize>(
     simd: S,
@@ -110,7 +110,7 @@ fn crossed_with<S: Simd, const I: usize, const J: usize>(
 }
 
 /// The products of I columns with J others.
-#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[inline(always)]
 fn dots<'a, S: Simd, const I: usize, const J: usize>(
     simd: S,
@@ -150,7 +150,7 @@ pub(super) const MOST_LANES: usize = 8;
 
 /// The sum of a vector's lanes. It goes through memory: the intrinsic is not inlined for vectors of
 /// eight, and takes longer than the products.
-#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[inline(always)]
 fn sum_of_lanes<S: Simd>(vector: S::f64s) -> f64 {
     let mut lanes = [0.0; MOST_LANES];
@@ -180,7 +180,7 @@ const HIGH: usize = 4;
 impl WithSimd for Added<'_> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
         let count = self.x.len() / self.inner;
@@ -206,7 +206,7 @@ impl WithSimd for Added<'_> {
 
 impl Added<'_> {
     /// R vectors of rows from `row` on, with all columns of X.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn strip<S: Simd, const R: usize>(&mut self, simd: S, row: usize, count: usize) {
         let mut j = 0;
@@ -220,7 +220,7 @@ impl Added<'_> {
         }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn tile<S: Simd, const R: usize, const J: usize>(&mut self, simd: S, row: usize, first_j: usize) {
         let mut sums = [[simd.splat_f64s(0.0); R]; J];

@@ -174,7 +174,8 @@ impl Fitted {
         }
         if !self.converged {
             warnings.push(
-                "the search had not settled when it was stopped: the estimate still moved by more than half its standard deviation, or the data had to be trusted less for it to move at all".into(),
+                "the search was stopped before it converged: the estimate still moved by more than half its standard deviation, or it moved only \
+                 after the data were given less weight".into(),
             );
         }
         if self.largest_error > 5.0 {
@@ -190,9 +191,9 @@ impl Fitted {
                 (true, true) => format!("between {low:.3e} and {high:.3e} {unit}"),
                 (true, false) => format!("above {low:.3e} {unit}"),
                 (false, true) => format!("below {high:.3e} {unit}"),
-                (false, false) => "nothing".into(),
+                (false, false) => "no limit".into(),
             };
-            warnings.push(format!("k_{dof} is not identified: the data say {says}"));
+            warnings.push(format!("k_{dof} is not identified; 95 % limits: {says}"));
         }
         warnings
     }

@@ -26,7 +26,7 @@ struct Elimination<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Elimination<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let Elimination { simd, n, a, x, swaps, reliable } = self;
@@ -84,7 +84,7 @@ struct Swap<S: Simd> {
 }
 
 impl<S: Simd> Swap<S> {
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn of(simd: S, k: usize, row: Lanes<S>) -> Self {
         let (mut others, mut count) = ([0; MOST_LANES], 0);
@@ -97,7 +97,7 @@ impl<S: Simd> Swap<S> {
         Swap { simd, k, row, others, count }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn in_column(&self, column: &mut [LaneCell<S>]) {
         if self.count == 1 {
@@ -112,7 +112,7 @@ impl<S: Simd> Swap<S> {
         }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn of_columns(&self, a: &mut [LaneCell<S>], n: usize) {
         for &other in self.others[..self.count].iter().filter(|other| **other != self.k) {

@@ -159,7 +159,7 @@ struct Read<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Read<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         self.bring_near();
@@ -180,7 +180,7 @@ impl<S: Simd> NullaryFnOnce for Read<'_, S> {
 impl<S: Simd> Read<'_, S> {
     /// Prefetches every column, one line after the other: the memory then delivers many cache lines
     /// in parallel, which it does not if each is awaited to be written to its lane.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn bring_near(&self) {
         let mut seen = 0.0;
@@ -205,7 +205,7 @@ struct Turned<'a, S: Simd, const CONJUGATE: bool> {
 impl<S: Simd, const CONJUGATE: bool> NullaryFnOnce for Turned<'_, S, CONJUGATE> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let rows = self.from.len() / self.columns.max(1);
@@ -225,7 +225,7 @@ struct Negated<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Negated<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for cell in self.cells {
@@ -245,7 +245,7 @@ struct Scaled<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Scaled<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for (column, right) in self.cells.chunks_exact_mut(self.rows).zip(self.d) {
@@ -265,7 +265,7 @@ struct Finite<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Finite<'_, S> {
     type Output = Reliable<S>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) -> Reliable<S> {
         let none = Lanes::all(self.simd, 0.0);
@@ -289,7 +289,7 @@ struct OneLine<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for OneLine<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for (to, cell) in self.to.iter_mut().zip(self.cells) {
@@ -307,7 +307,7 @@ struct PutLine<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for PutLine<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for (cell, value) in self.cells.iter_mut().zip(self.line) {

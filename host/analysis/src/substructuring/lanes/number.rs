@@ -11,7 +11,7 @@ pub(crate) struct Lanes<S: Simd> {
 }
 
 impl<S: Simd> Lanes<S> {
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn all(simd: S, value: f64) -> Self {
         Lanes { simd, of: simd.splat_f64s(value) }
@@ -28,40 +28,40 @@ impl<S: Simd> Lanes<S> {
         bytemuck::cast_slice_mut(std::slice::from_mut(&mut self.of))
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn over(self, other: Self) -> Self {
         Lanes { of: self.simd.div_f64s(self.of, other.of), ..self }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn sqrt(self) -> Self {
         Lanes { of: self.simd.sqrt_f64s(self.of), ..self }
     }
 
     /// True where this is larger; false where either is NaN.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn exceeds(self, other: Self) -> S::m64s {
         self.simd.greater_than_f64s(self.of, other.of)
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn equals(self, other: Self) -> S::m64s {
         self.simd.equal_f64s(self.of, other.of)
     }
 
     /// This where `mask` is true, the other elsewhere.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn where_or(self, mask: S::m64s, other: Self) -> Self {
         Lanes { of: self.simd.select_f64s(mask, self.of, other.of), ..self }
     }
 
     /// The smallest and the largest value.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn range(self) -> [f64; 2] {
         [self.simd.reduce_min_f64s(self.of), self.simd.reduce_max_f64s(self.of)]
@@ -102,7 +102,7 @@ operators!(Add::add by add_f64s, AddAssign::add_assign; Sub::sub by sub_f64s, Su
 impl<S: Simd> Mul for Lanes<S> {
     type Output = Self;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         Lanes { of: self.simd.mul_f64s(self.of, other.of), ..self }
@@ -112,7 +112,7 @@ impl<S: Simd> Mul for Lanes<S> {
 impl<S: Simd> Neg for Lanes<S> {
     type Output = Self;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn neg(self) -> Self {
         Lanes { of: self.simd.neg_f64s(self.of), ..self }
@@ -128,32 +128,32 @@ pub(crate) struct LaneCell<S: Simd> {
 
 impl<S: Simd> LaneCell<S> {
     /// A real number, the same for all lines.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn all(simd: S, value: f64) -> Self {
         LaneCell { re: Lanes::all(simd, value), im: Lanes::all(simd, 0.0) }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn norm_sqr(self) -> Lanes<S> {
         self.re * self.re + self.im * self.im
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn conj(self) -> Self {
         LaneCell { im: -self.im, ..self }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn inv(self) -> Self {
         let square = self.norm_sqr();
         LaneCell { re: self.re.over(square), im: (-self.im).over(square) }
     }
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn where_or(self, mask: S::m64s, other: Self) -> Self {
         LaneCell { re: self.re.where_or(mask, other.re), im: self.im.where_or(mask, other.im) }
@@ -163,7 +163,7 @@ impl<S: Simd> LaneCell<S> {
 impl<S: Simd> Neg for LaneCell<S> {
     type Output = Self;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn neg(self) -> Self {
         LaneCell { re: -self.re, im: -self.im }
@@ -173,7 +173,7 @@ impl<S: Simd> Neg for LaneCell<S> {
 impl<S: Simd> Mul for LaneCell<S> {
     type Output = Self;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         LaneCell { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
@@ -183,7 +183,7 @@ impl<S: Simd> Mul for LaneCell<S> {
 impl<S: Simd> Mul<Lanes<S>> for LaneCell<S> {
     type Output = Self;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn mul(self, other: Lanes<S>) -> Self {
         LaneCell { re: self.re * other, im: self.im * other }
@@ -198,14 +198,14 @@ pub(crate) struct Reliable<S: Simd> {
 }
 
 impl<S: Simd> Reliable<S> {
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn all(simd: S) -> Self {
         Reliable { of: Lanes::all(simd, 1.0) }
     }
 
     /// Restricts it to the lines where `mask` is true.
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     pub(crate) fn only(&mut self, mask: S::m64s) {
         self.of = self.of.where_or(mask, Lanes::all(self.of.simd, 0.0));

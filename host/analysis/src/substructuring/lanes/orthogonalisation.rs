@@ -26,7 +26,7 @@ struct Orthogonalisation<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Orthogonalisation<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let Orthogonalisation { simd, m, n, q, r, reliable } = self;
@@ -85,7 +85,7 @@ struct Substitution<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Substitution<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for x in self.x.chunks_exact_mut(self.n.max(1)) {
@@ -100,7 +100,7 @@ impl<S: Simd> NullaryFnOnce for Substitution<'_, S> {
     }
 }
 
-#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[inline(always)]
 fn square_of<S: Simd>(simd: S, v: &[LaneCell<S>]) -> Lanes<S> {
     let mut sum = Lanes::all(simd, 0.0);

@@ -41,7 +41,7 @@ struct Longer<'a, S: Simd> {
 impl<S: Simd> NullaryFnOnce for Longer<'_, S> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         self.cells.resize(self.count, LaneCell::all(self.simd, 0.0));

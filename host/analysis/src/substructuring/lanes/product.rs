@@ -61,7 +61,7 @@ struct Added<'a, S: Simd, const PLUS: bool> {
 impl<S: Simd, const PLUS: bool> NullaryFnOnce for Added<'_, S, PLUS> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for (a, b) in self.a.iter_mut().zip(self.b) {
@@ -79,7 +79,7 @@ pub(crate) trait Factor<S: Simd>: Copy {
 impl<S: Simd> Factor<S> for LaneCell<S> {
     type In = LaneCell<S>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn ready(self, _: S) -> LaneCell<S> {
         self
@@ -89,7 +89,7 @@ impl<S: Simd> Factor<S> for LaneCell<S> {
 impl<S: Simd> Factor<S> for f64 {
     type In = Lanes<S>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn ready(self, simd: S) -> Lanes<S> {
         Lanes::all(simd, self)
@@ -99,7 +99,7 @@ impl<S: Simd> Factor<S> for f64 {
 impl<S: Simd> Mul<LaneCell<S>> for Lanes<S> {
     type Output = LaneCell<S>;
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn mul(self, other: LaneCell<S>) -> LaneCell<S> {
         other * self
@@ -125,7 +125,7 @@ where
 {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let LaneSums { simd, out, rows, columns, factors, inner } = self;
@@ -145,7 +145,7 @@ where
 }
 
 /// R rows of a column, three terms at a time, in the order of [`product`](super::super::product).
-#[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+#[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
 #[inline(always)]
 fn add<S: Simd, A: Factor<S>, B: Factor<S>, const R: usize>(
     simd: S,

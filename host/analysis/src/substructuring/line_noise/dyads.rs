@@ -133,7 +133,7 @@ struct Add<'a> {
 impl NullaryFnOnce for Add<'_> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let dofs = self.right.len();
@@ -158,7 +158,7 @@ struct Squares<'a> {
 impl NullaryFnOnce for Squares<'_> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         for (g, v) in self.g.chunks_exact(self.sums.len()).zip(self.variance) {
@@ -183,7 +183,7 @@ struct Mixed<'a> {
 impl NullaryFnOnce for Mixed<'_> {
     type Output = ();
 
-    #[expect(clippy::inline_always, reason = "only there the processor's vectors are known")]
+    #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]
     #[inline(always)]
     fn call(self) {
         let dofs = self.factors.len();

@@ -16,7 +16,7 @@ use crate::device::error::DeviceError;
 pub enum Shortfall {
     /// The largest drive does not reach the level.
     #[error(
-        "out of reach: the largest drive of {drive_v} V gives less; allow more (--max-drive), or order less"
+        "out of reach: the largest drive of {drive_v} V gives less; raise the drive (--max-drive), or order a smaller amplitude"
     )]
     Weak {
         /// The largest drive, V.
@@ -24,8 +24,8 @@ pub enum Shortfall {
     },
     /// The amplitude does not settle at the ordered value.
     #[error(
-        "never settled: after {seconds} s its amplitude still goes between {:.1} and {:.1} % of the order; go further from the \
-         resonance, or look for what is loose", 100.0 * least, 100.0 * most
+        "never settled: after {seconds} s its amplitude still varies between {:.1} and {:.1} % of the ordered value; move \
+         further from the resonance, or look for a loose part", 100.0 * least, 100.0 * most
     )]
     NeverSettled {
         /// How long the device waited, s.
@@ -44,7 +44,7 @@ pub enum Shortfall {
         channel: String,
     },
     /// The amplitude settled, then drifted during the record.
-    #[error("settled, but drifted to {:.1} % of the order while it was recorded; run the same command again", 100.0 * ratio)]
+    #[error("settled, but drifted to {:.1} % of the ordered value while it was recorded; run the same command again", 100.0 * ratio)]
     Strayed {
         /// Amplitude over the record, relative to the ordered one.
         ratio: f64,
@@ -137,10 +137,10 @@ pub fn check_fit(
             _ => options.most_drive_v.unwrap_or(full_v),
         };
         if drive_v > full_v * (1.0 + 1e-6) {
-            return unfit(format!("{level}: its drive goes to {full_v} V, not to {drive_v} V"));
+            return unfit(format!("{level}: its drive reaches only {full_v} V, not {drive_v} V"));
         }
         if level.frequency_hz.max(level.end_hz.unwrap_or(0.0)) > highest_hz {
-            return unfit(format!("{level}: its shaker goes up to {highest_hz} Hz"));
+            return unfit(format!("{level}: its shaker reaches at most {highest_hz} Hz"));
         }
     }
     Ok(())
@@ -156,24 +156,24 @@ pub fn in_words(reason: Option<Reason>, channels: &ChannelMap, limit: impl Fn(u8
                 .map_or(("?", ""), |channel| (channel.name.as_str(), channel.quantity.unit()));
             format!(
                 "channel `{name}` went beyond its limit of {:.4} {unit}; order a smaller amplitude or another frequency, or raise \
-                 the limit (--limit {name}=VALUE) if the rig may take it",
+                 the limit (--limit {name}=VALUE) if the rig can take it",
                 limit(channel)
             )
         }
         Some(Reason::Runaway) => {
-            "its amplitude rose to half as much again as was ordered: a resonance is too close, or a sensor \
+            "its amplitude rose to 1.5 times the ordered value: a resonance is too close, or a sensor \
              was lost; check the vibrometers' signal, then try another frequency"
                 .into()
         }
         Some(Reason::Interlock) => "the guard was opened: close it".into(),
         Some(Reason::EmergencyStop) => "the emergency stop: release and reset it at the rig".into(),
         Some(Reason::LinkLost) => {
-            "the device did not hear this program for a second: is the machine overloaded?".into()
+            "the device received nothing from this program for a second: is the machine overloaded?".into()
         }
         Some(Reason::Expired) => "its order expired before it was renewed: is the machine overloaded?".into(),
         Some(Reason::Supply { channel }) => {
             let name = channels.channels.get(usize::from(channel)).map_or("?", |channel| &channel.name);
-            format!("the sensor of channel `{name}` is not there any more: its cable is open or shorted")
+            format!("the sensor of channel `{name}` is missing: its cable is open or shorted")
         }
         Some(Reason::FrontEnd) => "the converters lost scans; see the controller's log".into(),
         Some(Reason::Clock) => "the external clock was lost: it stopped or left its tolerance".into(),
@@ -181,7 +181,7 @@ pub fn in_words(reason: Option<Reason>, channels: &ChannelMap, limit: impl Fn(u8
         Some(Reason::StreamEnded) => "the stream ended".into(),
         Some(Reason::Asked) => "another program asked for it".into(),
         Some(Reason::Fired | Reason::Weak) | None => {
-            "the reason was lost on the way; see the controller's log".into()
+            "the reason was lost in transmission; see the controller's log".into()
         }
     }
 }

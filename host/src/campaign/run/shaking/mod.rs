@@ -414,7 +414,8 @@ pub const WITHIN: f64 = 0.02;
 const DRIFT: f64 = 0.01;
 
 /// The criterion for settled, as text.
-pub const CRITERION: &str = "settled: six windows of 0.1 s in a row within 2 % of the order, their later half within 1 % of the earlier";
+pub const CRITERION: &str = "settled: six windows of 0.1 s in a row within 2 % of the order, the second half of them within 1 % \
+    of the first";
 
 /// Whether the last windows satisfy the criterion. Without a target (open-loop drive) they must
 /// agree with each other.

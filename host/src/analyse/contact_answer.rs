@@ -1,0 +1,95 @@
+//! The contact stiffness: selects the cells used, and evaluates them together.
+
+use super::averages::CellAverage;
+use super::cell::{CellName, Measurements};
+use crate::contact;
+use crate::contact::{BAND, ContactCell, ContactError, Input, Known, Stiffness, read};
+use crate::spectra::CrossSpectra;
+use crate::structure::Structure;
+use crate::substructuring::geometry::{Geometry, Grouping};
+
+/// Whether a cell is used for the estimate of the contact: arm B's interface from hits on B alone,
+/// and from the assembly arm B's interface and the specimens from hits along z on A or on the part
+/// behind it.
+pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
+    let specimen = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::SpecimenA);
+    if !specimen || name.configuration == Structure::A {
+        return false;
+    }
+    let points = geometry.points(name.configuration);
+    let mut own = points.channels.iter().filter(|p| p.name == name.response);
+    // the contact's signals and the vibrometers on the specimens are along z, and the estimator
+    // needs the motion along x, y and z
+    let usual = own.clone().map(|p| p.direction).eq([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    let served = usual && own.any(|p| contact::serves(p.grouping));
+    let hit = points.impacts.iter().find(|p| p.name == name.impact);
+    served
+        && hit.is_some_and(|p| match name.configuration {
+            Structure::B => p.grouping == Grouping::InterfaceB,
+            _ => {
+                matches!(p.grouping, Grouping::InterfaceA | Grouping::InternalA) && p.direction[2].abs() > 0.9
+            }
+        })
+}
+
+/// Identifies the contact from the averaged cells.
+///
+/// # Errors
+/// Why there is no result, and how to obtain one.
+pub fn answer<M: Measurements>(
+    measurements: &M,
+    averages: &[CellAverage],
+) -> Result<(Stiffness, Known), ContactError> {
+    let cells = cells(measurements, averages, |average| average.damped.as_ref());
+    if cells.is_empty() {
+        let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
+        return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
+    }
+    read(&input(measurements, cells)?)
+}
+
+/// The cells that have these spectra.
+pub fn cells<'a, M: Measurements>(
+    measurements: &'a M,
+    averages: &'a [CellAverage],
+    spectra: impl Fn(&'a CellAverage) -> Option<&'a CrossSpectra>,
+) -> Vec<ContactCell<'a>> {
+    let geometry = measurements.geometry();
+    let cell = |average: &'a CellAverage| {
+        let spectra = spectra(average)?;
+        let points = geometry.points(average.name.configuration);
+        let impact = points.impacts.iter().find(|p| p.name == average.name.impact)?;
+        let point = points.channels.iter().find(|p| p.name == average.name.response)?;
+        Some(ContactCell {
+            structure: average.name.configuration,
+            impact: &impact.name,
+            impact_m: impact.position_m,
+            direction: impact.direction,
+            impact_grouping: impact.grouping,
+            point: &point.name,
+            point_m: point.position_m,
+            point_sigma_m: measurements.point_sigma_m(&point.name),
+            point_grouping: point.grouping,
+            spectra,
+            quantity: measurements.quantity(),
+        })
+    };
+    averages.iter().filter_map(cell).collect()
+}
+
+/// Input of the contact identification.
+///
+/// # Errors
+/// The plan does not state the vibrometers' points near the contact.
+pub fn input<'a, M: Measurements>(
+    measurements: &M,
+    cells: Vec<ContactCell<'a>>,
+) -> Result<Input<'a>, ContactError> {
+    Ok(Input {
+        cells,
+        contact_m: measurements.geometry().virtual_point_b_m,
+        spots_m: measurements.spots_m().ok_or(ContactError::NoSpots)?,
+        priors: measurements.contact_priors(),
+        band_hz: BAND,
+    })
+}
