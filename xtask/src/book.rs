@@ -6,7 +6,8 @@ use crate::consent::Consent;
 use crate::layout::pages;
 use crate::project::Project;
 use anyhow::{Context, Result};
-use pulldown_cmark::{Options, Parser, html};
+use pulldown_cmark::{Event, Options, Parser, Tag, html};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -54,18 +55,24 @@ fn mdbook(project: &Project, consent: Consent) -> Result<PathBuf> {
     Ok(own)
 }
 
-/// Writes the files outside `docs/` to which the book's pages link: Markdown as HTML, because
-/// mdBook changes the ending of links to it.
+/// Writes the files outside `docs/` to which the book's pages link, directly or indirectly:
+/// Markdown as HTML, because mdBook changes the ending of links to it.
 fn linked(project: &Project, book: &Path) -> Result<()> {
-    for (path, content) in pages::read(&project.root)? {
-        let targets = content.links.iter().filter_map(|link| pages::target(&path, link));
-        let outside = targets.map(|(target, _)| target).filter(|target| !target.starts_with(pages::BOOK));
-        for target in outside.filter(|_| path.starts_with(pages::BOOK)) {
+    let pages = pages::read(&project.root)?;
+    let mut open: Vec<PathBuf> = pages.keys().filter(|page| page.starts_with(pages::BOOK)).cloned().collect();
+    let mut seen = BTreeSet::new();
+    while let Some(path) = open.pop() {
+        for link in pages.get(&path).into_iter().flat_map(|page| &page.links) {
+            let Some((target, _)) = pages::target(&path, link) else { continue };
             let (from, to) = (project.root.join(&target), book.join(&target));
-            if target.extension().is_some_and(|extension| extension == "md") {
+            if target.starts_with(pages::BOOK) || !from.is_file() || !seen.insert(target.clone()) {
+                continue;
+            }
+            if pages.contains_key(&target) {
                 let text = fs::read_to_string(&from)
                     .with_context(|| format!("could not read {}", from.display()))?;
                 write(&to.with_extension("html"), &page(&text))?;
+                open.push(target);
             } else {
                 copy(&from, &to)?;
             }
@@ -74,9 +81,20 @@ fn linked(project: &Project, book: &Path) -> Result<()> {
     Ok(())
 }
 
+/// A page of HTML. Links to Markdown lead to the HTML that is made of it.
 fn page(markdown: &str) -> String {
+    let events = Parser::new_ext(markdown, Options::ENABLE_TABLES).map(|event| match event {
+        Event::Start(Tag::Link { link_type, dest_url, title, id }) => {
+            let dest_url = match dest_url.split_once(".md") {
+                Some((path, anchor)) if !path.contains(':') => format!("{path}.html{anchor}").into(),
+                _ => dest_url,
+            };
+            Event::Start(Tag::Link { link_type, dest_url, title, id })
+        }
+        other => other,
+    });
     let mut text = "<!DOCTYPE html>\n<meta charset=\"utf-8\">\n<title>jointrig</title>\n".to_owned();
-    html::push_html(&mut text, Parser::new_ext(markdown, Options::ENABLE_TABLES));
+    html::push_html(&mut text, events);
     text
 }
 
@@ -104,12 +122,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_is_copied_with_what_is_below_it() {
+    fn a_page_links_to_pages_and_a_folder_is_copied_with_what_is_below_it() {
         let folder = tempfile::tempdir().expect("a scratch folder");
-        write(&folder.path().join("a/b/c.html"), &page("# One")).expect("written");
+        write(&folder.path().join("a/b/c.html"), &page("[One](x.md#y) [two](z.rs)")).expect("written");
         copy(&folder.path().join("a"), &folder.path().join("d")).expect("copied");
         let text = fs::read_to_string(folder.path().join("d/b/c.html")).expect("it is there");
-        assert!(text.ends_with("<h1>One</h1>\n"), "{text}");
+        assert!(text.ends_with("<a href=\"x.html#y\">One</a> <a href=\"z.rs\">two</a></p>\n"), "{text}");
         assert!(copy(&folder.path().join("nowhere"), &folder.path().join("e")).is_err());
     }
 }

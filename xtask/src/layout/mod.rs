@@ -1,7 +1,6 @@
 //! `cargo xtask layout`: structural rules that a program can check, in seconds and without
 //! compiling anything.
 
-mod allowed_imports;
 mod crates;
 mod cycles;
 mod equations;
