@@ -13,9 +13,9 @@ use jointrig_hil_sim::link::HostEnd;
 use jointrig_hil_sim::rig::RigConfig;
 use sha2::{Digest, Sha256};
 
+use std::io;
 use std::path::Path;
 use std::time::Duration;
-use std::io;
 
 /// A running virtual board.
 pub struct Sim {
