@@ -346,8 +346,8 @@ pub mod registers {
     /// Position of the number of lines in CONFIG.
     pub const LINES_SHIFT: u8 = 3;
 
-    /// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel is
-    /// in the lower half.
+    /// Ranges of channels 1 and 2; the next three registers hold the other pairs. The odd channel
+    /// is in the lower half.
     pub const RANGE_CH1_CH2: u8 = 0x03;
     /// One bit per channel: 1 selects 220 kHz (AD7606C only).
     pub const BANDWIDTH: u8 = 0x07;

@@ -406,8 +406,8 @@ pub(super) type Opened = (ZipArchive<BufReader<File>>, u64);
 /// Opens the archive at `path`.
 ///
 /// # Errors
-/// As [`untrusted_input::open`]; [`ErrorKind::InvalidData`] for a file that is not a zip archive or lists
-/// too many members.
+/// As [`untrusted_input::open`]; [`ErrorKind::InvalidData`] for a file that is not a zip archive or
+/// lists too many members.
 pub(super) fn open(path: &Path) -> io::Result<Opened> {
     let (mut file, size) = untrusted_input::open(path)?;
     refuse_long_lists(&mut file, size)?;

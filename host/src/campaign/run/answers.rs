@@ -94,7 +94,8 @@ const QUEUE: usize = 16;
 pub enum Edit {
     /// A line in the campaign's log.
     Note(String),
-    /// A different verdict for a record: [`Verdict::Good`] keeps it, [`Verdict::Dropped`] leaves it out.
+    /// A different verdict for a record: [`Verdict::Good`] keeps it, [`Verdict::Dropped`] leaves it
+    /// out.
     Overrule {
         /// The record.
         record: i64,
