@@ -24,6 +24,15 @@ pub const WHEEL: u64 = 5_000_000;
 
 /// The package that builds the wheel, and those that test it where nothing else is installed.
 const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
+
+/// Options of maturin that compile the host's own code for size: the wheel has a size limit, and
+/// the loops over samples and lines are in other packages (jointrig-analysis, pco, rustfft).
+pub const FOR_SIZE: [&str; 4] = [
+    "--config",
+    "profile.release.package.jointrig.opt-level=\"s\"",
+    "--config",
+    "profile.release.package.jointrig-uff.opt-level=\"s\"",
+];
 const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
 /// Packages that are used together with the wheel: those of notebooks, engines that read the
@@ -119,7 +128,7 @@ fn build(project: &Project, folder: &Path, tools: &Path, interpreter: &Path) -> 
     }
     let mut maturin = Command::new(tools.with_file_name("maturin"));
     maturin.current_dir(project.root.join("host/python"));
-    maturin.args(["build", "--release", "--locked", "--quiet", "--out"]).arg(&wheels);
+    maturin.args(["build", "--release", "--locked", "--quiet"]).args(FOR_SIZE).arg("--out").arg(&wheels);
     maturin.arg("--interpreter").arg(interpreter).env("CARGO_TARGET_DIR", &project.target);
     command::run(&mut maturin).context("the wheel cannot be built")?;
     let built = fs::read_dir(&wheels)?.flatten().map(|entry| entry.path()).next();

@@ -71,7 +71,12 @@ fn build(project: &Project, tools: &Path, interpreter: &Path, target: &str, out:
     let mut maturin = Command::new(tools.with_file_name("maturin"));
     maturin.current_dir(project.root.join("host/python"));
     maturin.args(["build", "--release", "--locked", "--zig", "--compatibility", COMPATIBILITY]);
-    maturin.args(["--target", target, "--out"]).arg(out).arg("--interpreter").arg(interpreter);
+    maturin
+        .args(crate::python::FOR_SIZE)
+        .args(["--target", target, "--out"])
+        .arg(out)
+        .arg("--interpreter")
+        .arg(interpreter);
     // maturin looks for Zig in the first Python on PATH
     let own = tools.parent().context("an environment has a folder of programs")?;
     let before = std::env::var_os("PATH").unwrap_or_default();
