@@ -122,7 +122,7 @@ fn of_configuration(sorted: &[CellAverage], structure: Structure) -> &[CellAvera
 }
 
 /// Copies of all three restricted to their common lines; `None` if one is missing, if their lines
-/// are equal, or if there is no common grid, which [`identify`] then reports.
+/// are equal, or if there is no common grid, which [`identify`](fn@identify) then reports.
 fn on_common_lines(frfs: [Option<&Frf>; 3], missing: &mut Vec<Missing>) -> Option<[Frf; 3]> {
     let [Some(a), Some(b), Some(ajb)] = frfs else { return None };
     if b.frequency_hz() == a.frequency_hz() && ajb.frequency_hz() == a.frequency_hz() {

@@ -34,7 +34,7 @@ impl Agreement {
     /// responses.
     ///
     /// # Errors
-    /// As for [`estimate`].
+    /// As for [`estimate`](fn@estimate).
     pub(super) fn of(
         records: &ImpactRecords,
         used: &[bool],

@@ -70,7 +70,7 @@ fn frfs_from_elsewhere_are_analysed_as_if_measured_here() {
     let told = done(folder, &["import", "AJB.uff", "--into", "c.jrig", "--configuration", "AJB"]);
     assert!(told.contains("AJB: ") && told.contains("no variance"), "{told}");
     assert!(done(folder, &["campaign", "status", "c.jrig"]).contains("FRFs of AJB from AJB.uff"));
-    assert!(done(folder, &["campaign", "verify", "c.jrig"]).contains("3 FRF matrices"));
+    assert!(done(folder, &["campaign", "verify", "c.jrig"]).contains("3 imported FRF matrices"));
     let campaign: Value =
         serde_json::from_str(&done(folder, &["analyse", "c.jrig", "--out", "out", "--json"])).expect("JSON");
     let identify = [

@@ -1,8 +1,8 @@
 //! Hysteresis: loops of the tangential force T over the relative displacement Δx, and the contact's
 //! properties derived from them.
 //!
-//! Processing order: [`record`] (the measured signals) → [`integration`] (velocity to displacement
-//! over whole cycles) → [`cycles`] (a shaker record, cut by its frequency) or [`impact`] (a decay,
+//! Processing order: [`record`] (the measured signals) → [`cycles`] (a shaker record, cut by its
+//! frequency, with velocity integrated to displacement over whole cycles) or [`impact`] (a decay,
 //! cut by its dominant mode) → [`loops`] (slopes, area, secant, fundamental) with `stick` (the
 //! stick part and the plateau) and [`shape`]; `steady` combines them for a shaker record.
 //! [`analyse`](mod@analyse) is the entry point, [`loop_analysis`] its result.
@@ -10,8 +10,7 @@
 //! Definitions are stated only here: k_T is the least-squares slope of the stick part; k_eq that of
 //! the whole loop; the peak secant and the ratio of fundamentals have their own names. T is used as
 //! given: the load cells' sum is not T at the contact (the static arm's inertia adds 2.4 % at 250
-//! Hz). [`correction`] converts it to the contact's force, with the parameters that [`static_arm`]
-//! identified, and the corrected record is analysed in addition to the raw one. [`compliance`]
+//! Hz). [`static_arm`] identifies the arm's parameters and converts it to the contact's force, and the corrected record is analysed in addition to the raw one. [`compliance`]
 //! treats the same signals in the frequency domain, [`backbone`] several levels.
 
 pub mod analyse;

@@ -1,5 +1,5 @@
 //! Identifies the static arm between contact and load cells: its effective mass m at the contact
-//! and the parallel path ρ in F = (1 + ρ) T + m ẍ_B (see [`super::correction`]).
+//! and the parallel path ρ in F = (1 + ρ) T + m ẍ_B (see `Correction`).
 //!
 //! There are two methods. **Hits on B alone**: the force at the contact is that of the hammer,
 //! transformed to the virtual point; both m and ρ come from one least-squares fit over frequency.

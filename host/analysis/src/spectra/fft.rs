@@ -1,5 +1,5 @@
-//! The transform of a windowed record, as a whole or in [pieces](super::pieces), with the lines in
-//! the [order](super::order) in which they are computed.
+//! The transform of a windowed record, as a whole or in pieces, with the lines in the order in
+//! which they are computed.
 //!
 //! The transform of a real record, computed by a complex one of half its length: even samples are
 //! the real parts, odd ones the imaginary parts.

@@ -7,7 +7,7 @@
 //!    dividing by s = σ + iω.
 //! 2. [`geometry`]: positions of the points and their purpose (`Grouping`).
 //! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]:
-//!    any number of virtual points); [`consistency`] measures what is lost.
+//!    any number of virtual points); [`quality`] measures what is lost.
 //! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts
 //!    without truncating.
 //! 5. [`joint_over_bands`]: K and C per line and over bands, with scatter, interval and warnings.
@@ -19,8 +19,8 @@
 //!    [`between_arms`](mod@between_arms): chooses between the two estimates.
 //! 9. [`coupling`]: the inverse problem, from parts to the assembly; [`cmif`](mod@cmif): how many
 //!    modes the interface needs; [`back_coupling`]: whether the identified joint reproduces the
-//!    measured assembly, and [`explained`]: which errors may prevent it; [`plausibility`]:
-//!    passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
+//!    measured assembly, and [`explained`]: which errors may prevent it; [`quality`] also
+//!    checks passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it
 //! is exact on s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are

@@ -29,7 +29,7 @@ impl Pushes {
         Pushes { t: t_f.clone(), turned: t_f.transpose() }
     }
 
-    /// Σ_c tᵢ[c] · (column c of blocks of `inner` values): inner × impacts.
+    /// Σ_c tᵢ\[c\] · (column c of blocks of `inner` values): inner × impacts.
     fn contracted(&self, values: &[f64], inner: usize) -> DMatrix<f64> {
         DMatrixView::from_slice(values, inner, self.t.ncols()) * &self.turned
     }

@@ -449,7 +449,7 @@ impl Point<'_> {
 }
 
 /// The derivatives of all cells' values at some lines, in the order of
-/// [`factors`](super::cell::factors); one column per line with the real parts, then one per line
+/// [`factors`]; one column per line with the real parts, then one per line
 /// with the imaginary parts.
 fn effects(factors: &DMatrix<f64>, ways: &[Way]) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(factors.ncols(), 2 * ways.len());
