@@ -61,6 +61,6 @@ fn everything_that_is_wrong_is_told_with_its_line() {
         .output()
         .unwrap();
     let said = String::from_utf8(new.stderr).unwrap();
-    assert!(new.status.code() == Some(1) && said.contains("tells 2 more"), "{said}");
+    assert!(new.status.code() == Some(1) && said.contains("lists 2 more"), "{said}");
     assert!(!folder.path().join("c.jrig").exists());
 }
