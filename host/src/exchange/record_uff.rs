@@ -400,8 +400,14 @@ impl Timing {
             ));
         }
         let from = std::iter::once(0.0).chain(whole.iter().copied()).map(|own| cut(own) as usize).collect();
-        let delay_s: Vec<f64> =
-            late_s.iter().zip(&whole).map(|(late, whole)| whole * step_s - late).map(|s| s + 0.0).collect();
+        // what is left within the printed digits of the two starts is no delay
+        let delay_s: Vec<f64> = (self.first[1..].iter().zip(&late_s).zip(&whole))
+            .map(|((own, late), whole)| {
+                let rest = whole * step_s - late;
+                let error = own.start_error_s + force.start_error_s + 1e-9 * step_s;
+                if rest.abs() <= error { 0.0 } else { rest }
+            })
+            .collect();
         let largest = late_s.iter().copied().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
         let note = (largest != 0.0).then(|| {
             format!("a response starts {largest:e} s after the force by its abscissa: it is put in step")
