@@ -550,7 +550,7 @@ impl State<'_> {
                     }
                     return Some(out);
                 }
-                // it left the ring meanwhile: the host asks again and is told that it is gone
+                // it left the ring since then: the host asks again, and the answer says so
                 _ => drop(self.resends.pop_front()),
             }
         }

@@ -30,7 +30,7 @@ pub enum RunError {
     /// The thread that stores records ended without a reason.
     #[error("records can no longer be stored; run the same command again")]
     KeeperGone,
-    /// The hammer is swung by a person, and nobody struck.
+    /// The hammer is swung by a person, and no hit came in time.
     #[error("{cell}: no hit within {seconds} s (hammer.patience_s); run the same command again to continue")]
     NobodyStruck {
         /// The cell.
