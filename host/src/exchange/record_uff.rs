@@ -400,11 +400,13 @@ impl Timing {
             ));
         }
         let from = std::iter::once(0.0).chain(whole.iter().copied()).map(|own| cut(own) as usize).collect();
-        // what is left within the printed digits of the two starts is no delay
+        // what is left within the printed digits of the two starts and of the step is no delay
+        let step_error_s = rate.fs_error * step_s * step_s;
         let delay_s: Vec<f64> = (self.first[1..].iter().zip(&late_s).zip(&whole))
             .map(|((own, late), whole)| {
                 let rest = whole * step_s - late;
-                let error = own.start_error_s + force.start_error_s + 1e-9 * step_s;
+                let starts = own.start_error_s + force.start_error_s + 1e-9 * step_s;
+                let error = starts + whole.abs() * step_error_s;
                 if rest.abs() <= error { 0.0 } else { rest }
             })
             .collect();
