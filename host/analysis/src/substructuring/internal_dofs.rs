@@ -2,12 +2,10 @@
 //! line by line.
 
 use super::geometry::Grouping;
-use super::interface_data::{Found, InterfaceError, Measured};
-use super::lanes::{Matrix, Pool, lines, minus, times, to_left_of};
+use super::interface_data::{Found, InterfaceError};
 use super::measured_set::{Balanced, MeasuredSet, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
-use pulp::Simd;
 
 type Line = DMatrix<Complex<f64>>;
 
@@ -97,23 +95,6 @@ impl<'a> Rearrangement<'a> {
     pub(super) fn q(&self, l: usize) -> Result<Line, InterfaceError> {
         let file = self.measured_set.alone(self.hit);
         file.reduced_outputs(l, &self.hit_at.t_u, &self.hit_at.vp.rows, &self.columns)
-    }
-
-    /// P, M and Q of the lines of a vector.
-    pub(super) fn batched<'p, S: Simd>(&self, pool: &'p Pool<S>, first: usize) -> [Matrix<'p, S>; 3] {
-        let read = |file: Measured<'_>, rows: &Found, columns: &Found| {
-            Matrix::read(pool, &lines(pool, file.frf.lines(), first), &rows.at, &columns.at)
-        };
-        let (seen, hit) = (self.measured_set.alone(self.seen), self.measured_set.alone(self.hit));
-        let p = times(&read(seen, &self.rows, &self.seen_at.vp.columns), &self.seen_at.t_f);
-        let q = to_left_of(&self.hit_at.t_u, &read(hit, &self.hit_at.vp.rows, &self.columns));
-        let assembled = read(self.measured_set.ajb, &self.rows_ajb, &self.columns_ajb);
-        let m = if self.seen == self.hit {
-            minus(read(seen, &self.rows, &self.columns), &assembled)
-        } else {
-            assembled
-        };
-        [p, m, q]
     }
 
     /// M: from the internal impacts to the internal responses in the assembly; if both are on one

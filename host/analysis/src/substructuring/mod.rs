@@ -28,7 +28,6 @@
 
 pub mod averaged;
 pub mod back_coupling;
-mod batched;
 pub mod between_arms;
 pub mod cmif;
 pub mod coupling;
@@ -44,11 +43,9 @@ pub mod idm;
 mod interface_data;
 mod internal_dofs;
 pub mod joint_over_bands;
-mod lanes;
 pub mod line_noise;
 mod measured_set;
 pub mod method;
-mod per_line;
 mod product;
 pub mod pseudo_inverse;
 pub mod quality;

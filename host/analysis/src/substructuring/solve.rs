@@ -1,15 +1,14 @@
 //! Z^J of every line by every requested method.
 
-use super::batched::{Job, LineResults};
-use super::decoupling::{DecouplingError, PrimalBlock, inverse_of, observed_rank, primal_of};
+use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
+use super::interface_data::{balance, scaled};
 use super::internal_dofs::Rearrangement;
-use super::measured_set::{MeasuredSet, Side};
+use super::measured_set::MeasuredSet;
 use super::method::Method;
-use super::per_line::{LineRefusal, Stage, Work};
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
-use super::reduced::{MethodKind, Reduced, RefusedReason};
+use super::reduced::{MethodKind, Reduced, RefusedReason, every_line};
 use nalgebra::{Complex, DMatrix};
 
 type Line = DMatrix<Complex<f64>>;
@@ -27,6 +26,14 @@ pub(super) struct Solutions {
     pub(super) alone: Vec<Vec<Line>>,
     /// In the order of the methods.
     pub(super) by_method: Vec<Result<Solution, RefusedReason>>,
+}
+
+/// The operation that a method applies to a line.
+enum Work<'a> {
+    Internals(Box<Rearrangement<'a>>),
+    Interface,
+    Primal(PrimalBlock),
+    Inverse(InverseBlock),
 }
 
 /// A method with notes for the user.
@@ -47,20 +54,55 @@ impl Reduced {
         methods: &[Method],
         alone: bool,
     ) -> Result<Solutions, RefusedReason> {
-        let plans: Vec<Result<MethodPlan<'_>, RefusedReason>> =
-            methods.iter().map(|&method| self.plan(measured_set, method)).collect();
-        let works = plans.iter().flatten().map(|plan| &plan.work).collect();
-        let LineResults { alone, z } = Job { reduced: self, measured_set, works, alone }.found()?;
-        let mut z = z.into_iter();
-        let by_method = plans
-            .into_iter()
-            .map(|plan| {
-                let MethodPlan { notes, internals, .. } = plan?;
-                let z = z.next().unwrap_or_else(|| Ok(Vec::new()))?;
-                Ok(Solution { z, notes, internals })
+        let [y_a, y_b] = self.alone(measured_set)?;
+        let alone = if alone { vec![y_a.clone(), y_b.clone()] } else { Vec::new() };
+        let by_method = methods
+            .iter()
+            .map(|&method| {
+                let MethodPlan { work, notes, internals } = self.plan(measured_set, method)?;
+                Ok(Solution { z: self.z(measured_set, &work)?, notes, internals })
             })
             .collect();
         Ok(Solutions { alone, by_method })
+    }
+
+    /// Z^J of every line. The admittances of the virtual points are computed once for all methods;
+    /// the first line without a result is the refusal.
+    fn z(&self, measured_set: &MeasuredSet<'_>, work: &Work<'_>) -> Result<Vec<Line>, RefusedReason> {
+        let [y_a, y_b] = self.alone(measured_set)?;
+        let d = balance(self.idms);
+        let frf = measured_set.a.frf;
+        let order = frf.quantity().order_of_s();
+        let in_si = |l: usize, z: Result<Line, DecouplingError>| {
+            z.map(|z| scaled(z, &d, frf.s(l).powi(order)))
+                .map_err(|source| Self::refused(measured_set, l, source))
+        };
+        let lines = frf.lines().len();
+        match work {
+            Work::Internals(internals) => {
+                let method = if internals.printed { internal_printed } else { internal };
+                every_line(lines, |l| {
+                    let (p, m, q) = (internals.p(l)?, internals.m(l)?, internals.q(l)?);
+                    in_si(l, method(&y_a[l], &y_b[l], &p, &m, &q))
+                })
+            }
+            Work::Interface => {
+                let y = self.assembly(measured_set)?;
+                every_line(lines, |l| in_si(l, interface(&y_a[l], &y_b[l], &y[l])))
+            }
+            Work::Primal(block) => {
+                let z = self.impedance(measured_set)?;
+                let alone = match block {
+                    PrimalBlock::A => y_a,
+                    PrimalBlock::B => y_b,
+                };
+                every_line(lines, |l| in_si(l, primal_of(*block, &alone[l], &z[l])))
+            }
+            Work::Inverse(block) => {
+                let z = self.impedance(measured_set)?;
+                every_line(lines, |l| in_si(l, Ok(inverse_of(*block, &z[l]))))
+            }
+        }
     }
 
     fn plan<'a>(
@@ -122,42 +164,5 @@ impl Reduced {
             ));
         }
         Ok(MethodPlan { work: Work::Internals(Box::new(internals)), notes, internals: found })
-    }
-}
-
-impl Reduced {
-    /// Z^J of one separate line, for lines near rank loss or with a refusal. Rotations in metres.
-    pub(super) fn per_line(
-        &self,
-        measured_set: &MeasuredSet<'_>,
-        work: &Work<'_>,
-        l: usize,
-    ) -> Result<Line, LineRefusal> {
-        let alone = |side| self.alone_at(measured_set, side, l).map_err(Stage::Method.refuses());
-        let assembly = || self.assembly_at(measured_set, l).map_err(Stage::Assembly.refuses());
-        let impedance =
-            || Self::impedance_of(measured_set, l, &assembly()?).map_err(Stage::Impedance.refuses());
-        let found = match work {
-            Work::Internals(internals) => {
-                let method = if internals.printed { internal_printed } else { internal };
-                let (p, m, q) = (internals.p(l), internals.m(l), internals.q(l));
-                let [p, m, q] = [p, m, q].map(|block| block.map_err(Stage::Method.refuses()));
-                method(&alone(Side::A)?, &alone(Side::B)?, &p?, &m?, &q?)
-            }
-            Work::Interface => {
-                let y = assembly()?;
-                interface(&alone(Side::A)?, &alone(Side::B)?, &y)
-            }
-            Work::Primal(block) => {
-                let z = impedance()?;
-                let side = match block {
-                    PrimalBlock::A => Side::A,
-                    PrimalBlock::B => Side::B,
-                };
-                primal_of(*block, &alone(side)?, &z)
-            }
-            Work::Inverse(block) => Ok(inverse_of(*block, &impedance()?)),
-        };
-        found.map_err(|source| Stage::Method.refuses()(Self::refused(measured_set, l, source)))
     }
 }

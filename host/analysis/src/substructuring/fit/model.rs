@@ -5,13 +5,10 @@
 //! R with L = I − P G⁻¹ B and R = I − Bᵀ G⁻¹ Q; a change of the joint gives −P δ(G⁻¹) Q.
 
 use super::block::{Line, Ports};
-use super::chart;
 use super::chart::At;
-use crate::substructuring::lanes::{Matrix, Pool, Reliable, inverse, lines, minus, plus, product};
+use crate::substructuring::product::product;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
-use crate::vectors::wide;
 use nalgebra::Complex;
-use pulp::{Simd, WithSimd};
 
 type C = Complex<f64>;
 
@@ -84,7 +81,51 @@ impl Layout {
         wanted: Wanted,
     ) -> Vec<Option<Predicted>> {
         assert!(parts.iter().all(|part| part.len() == joint.len()), "A, B and the joint have the same lines");
-        wide(Predictions { layout: self, joint, parts, wanted })
+        (0..joint.len()).map(|l| self.predict_line(&joint[l], parts.map(|part| &part[l]), wanted)).collect()
+    }
+
+    /// The model at one line; none for a singular G.
+    fn predict_line(&self, joint: &At, parts: [&Line; 2], wanted: Wanted) -> Option<Predicted> {
+        let n = self.n;
+        let (rows, columns) = self.shape();
+        let (mut p, mut q) = (Line::zeros(rows, n), Line::zeros(n, columns));
+        for (side, part) in parts.into_iter().enumerate() {
+            let (row, column) = self.corner(side);
+            let pushed = part.columns(self.columns[side].first[0], n);
+            let moved = part.rows(self.rows[side].first[0], n);
+            p.rows_mut(row, part.nrows()).copy_from(&(pushed * sign(side)));
+            q.columns_mut(column, part.ncols()).copy_from(&(moved * sign(side)));
+        }
+        let w = self.interface(parts);
+        // G⁻¹ = H D with H = (D W + E)⁻¹, which also exists for a rigid joint
+        let h =
+            full_rank_inverse(&(product(&joint.d, &w) + &joint.e), "the interface with the joint").ok()?;
+        let g = product(&h, &joint.d);
+        let gq = product(&g, &q);
+        let empty = || Line::zeros(0, 0);
+        let y = if wanted.y {
+            let mut y = -product(&p, &gq);
+            for (side, part) in parts.into_iter().enumerate() {
+                let mut alone = y.view_mut(self.corner(side), part.shape());
+                alone += part;
+            }
+            y
+        } else {
+            empty()
+        };
+        let slopes = match &joint.slopes {
+            Some(by_joint) if wanted.slopes => {
+                // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹), δD = left dᵀ
+                let rest = &q - product(&w, &gq);
+                Slopes {
+                    moved: -product(&product(&p, &h), &by_joint.left),
+                    by: product(&rest.transpose(), &by_joint.d) - product(&gq.transpose(), &by_joint.e),
+                }
+            }
+            _ => Slopes { moved: empty(), by: empty() },
+        };
+        let (pg, gq) = if wanted.gains { (product(&p, &g), gq) } else { (empty(), empty()) };
+        Some(Predicted { y, pg, gq, slopes })
     }
 
     /// The columns of L for a side's output ports: all output ports × the side's.
@@ -111,108 +152,4 @@ impl Layout {
 /// The sign of a side in B: A's interface motion minus B's.
 fn sign(side: usize) -> C {
     C::from(if side == 0 { 1.0 } else { -1.0 })
-}
-
-/// The model at as many lines simultaneously as the processor's vectors hold.
-struct Predictions<'a> {
-    layout: &'a Layout,
-    joint: &'a [At],
-    parts: [&'a [Line]; 2],
-    wanted: Wanted,
-}
-
-impl WithSimd for Predictions<'_> {
-    type Output = Vec<Option<Predicted>>;
-
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<Option<Predicted>> {
-        let pool = Pool::new(simd);
-        let firsts = (0..self.joint.len()).step_by(S::F64_LANES);
-        firsts.flat_map(|first| self.from(&pool, first)).collect()
-    }
-}
-
-impl Predictions<'_> {
-    /// The lines of a vector from `first` on.
-    fn from<S: Simd>(&self, pool: &Pool<S>, first: usize) -> Vec<Option<Predicted>> {
-        let Predictions { layout, joint, parts, wanted } = *self;
-        let n = layout.n;
-        let lanes = S::F64_LANES.min(joint.len() - first);
-        let (rows, columns) = layout.shape();
-        let own = [0, 1].map(|side| Matrix::whole(pool, &lines(pool, parts[side], first)));
-        let (mut p, mut q) = (Matrix::any(pool, rows, n), Matrix::any(pool, n, columns));
-        for (side, own) in own.iter().enumerate() {
-            let (row, column) = layout.corner(side);
-            let pushed = own.block((0, layout.columns[side].first[0]), (own.rows(), n));
-            let moved = own.block((layout.rows[side].first[0], 0), (n, own.columns()));
-            let [pushed, moved] =
-                if side == 0 { [pushed, moved] } else { [pushed.negated(), moved.negated()] };
-            p.put((row, 0), &pushed);
-            q.put((0, column), &moved);
-        }
-        let [of_a, of_b] = [0, 1].map(|side| {
-            let at = (layout.rows[side].first[0], layout.columns[side].first[0]);
-            own[side].block(at, (n, n))
-        });
-        let w = plus(of_a, &of_b);
-        let joint = lines(pool, joint, first);
-        let of_joint = |of: fn(&At) -> &Line| {
-            Matrix::whole(pool, &joint.iter().map(|at| of(at)).collect::<Vec<&Line>>())
-        };
-        let d = of_joint(|at| &at.d);
-        let (h, regular) = held(pool, &plus(product(&d, &w), &of_joint(|at| &at.e)), lanes);
-        let g = product(&h, &d);
-        let gq = product(&g, &q);
-        let y = wanted.y.then(|| {
-            let mut y = product(&p, &gq).negated();
-            for (side, own) in own.iter().enumerate() {
-                let at = layout.corner(side);
-                let alone = y.block(at, (own.rows(), own.columns()));
-                y.put(at, &plus(alone, own));
-            }
-            y
-        });
-        let pg = wanted.gains.then(|| product(&p, &g));
-        let slopes = wanted.slopes.then(|| {
-            let of = |of: fn(&chart::Slopes) -> &Line| {
-                let lines: Vec<&Line> = joint.iter().filter_map(|at| at.slopes.as_ref()).map(of).collect();
-                Matrix::whole(pool, &lines)
-            };
-            // δ(G⁻¹) = H (δD (I − W G⁻¹) − δE G⁻¹), δD = left dᵀ
-            let rest = minus(q, &product(&w, &gq));
-            let moved = product(&product(&p, &h), &of(|s| &s.left)).negated();
-            let by =
-                minus(product(&rest.transpose(), &of(|s| &s.d)), &product(&gq.transpose(), &of(|s| &s.e)));
-            (moved, by)
-        });
-        let line = |matrix: Option<&Matrix<'_, S>>, lane: usize| {
-            matrix.map_or_else(|| Line::zeros(0, 0), |matrix| matrix.line(lane))
-        };
-        (0..lanes)
-            .map(|lane| {
-                regular[lane].then(|| Predicted {
-                    y: line(y.as_ref(), lane),
-                    pg: line(pg.as_ref(), lane),
-                    gq: line(pg.as_ref().map(|_| &gq), lane),
-                    slopes: Slopes {
-                        moved: line(slopes.as_ref().map(|s| &s.0), lane),
-                        by: line(slopes.as_ref().map(|s| &s.1), lane),
-                    },
-                })
-            })
-            .collect()
-    }
-}
-
-/// H = (D W + E)⁻¹, and the lines at which it exists.
-fn held<'p, S: Simd>(pool: &Pool<S>, interface: &Matrix<'p, S>, lanes: usize) -> (Matrix<'p, S>, Vec<bool>) {
-    let mut reliable = Reliable::all(pool.simd);
-    let mut h = inverse(interface.copy(), &mut reliable);
-    let regular = (0..lanes).map(|lane| {
-        reliable.at(lane) || {
-            let careful = full_rank_inverse(&interface.line(lane), "the interface with the joint");
-            careful.map(|own| h.put_line(lane, &own)).is_ok()
-        }
-    });
-    let regular = regular.collect();
-    (h, regular)
 }
