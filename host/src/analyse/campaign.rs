@@ -3,13 +3,13 @@
 use super::assemble::everything;
 use super::averages::{CellAverage, LINES_HZ};
 use super::cell::Measurements;
+use super::cell::{BANDS, Progress, Wanted};
 use super::checks::between_the_arms;
 use super::findings::{Findings, Settings};
-use super::fits::{Fit, NoFit, fits};
 use super::from_frfs::Substructured;
+use super::from_frfs::{Fit, NoFit, fits};
+use super::from_frfs::{Recommended, recommended};
 use super::missing::{Missing, given_up};
-use super::recommended::{Recommended, recommended};
-use super::wanted::{BANDS, Progress, Wanted};
 use super::{cells_stage, configuration_stage, contact_stage, data_quality};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;

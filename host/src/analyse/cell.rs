@@ -1,12 +1,14 @@
-//! Data that the analysis needs from a campaign: its geometry, its cells, and the kept hits of one
-//! cell in SI units.
+//! The interface between a campaign and the stages of its analysis: its geometry, its cells, the kept
+//! hits of one cell in SI units; the options of the analysis, and its progress.
 
 use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;
 use crate::contact::ContactPriors;
 use crate::hysteresis::HysteresisRecord;
+use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
+use crate::substructuring::Band;
 use crate::substructuring::geometry::Geometry;
 
 /// One impact position with one response location.
@@ -183,4 +185,28 @@ pub trait Measurements: Sync {
         })?;
         Ok(Cell { left_out, ..whole })
     }
+}
+
+/// The bands over which means are computed, Hz; the first is the main one.
+pub const BANDS: [Band; 3] =
+    [MAIN_BAND, Band { low_hz: 100.0, high_hz: 800.0 }, Band { low_hz: 100.0, high_hz: 300.0 }];
+
+/// Additional results requested, and prior knowledge.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wanted {
+    /// Replicates of the bootstrap over hits; 0 for none.
+    pub replicates: usize,
+    /// Prior knowledge of contact and static arm.
+    pub known: KnownContact,
+    /// Whether the FRFs of every pair are kept in the findings.
+    pub frfs: bool,
+}
+
+/// Progress of the analysis: cells done, and total number of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Cells done.
+    pub done: usize,
+    /// Total number of cells.
+    pub total: usize,
 }

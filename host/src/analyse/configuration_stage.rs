@@ -1,11 +1,12 @@
-//! Assembles the averaged cells of one configuration to an FRF matrix with its noise, or uses
-//! imported FRFs instead.
+//! The FRF matrix of one configuration with its noise: assembled from the averaged cells, or from
+//! imported FRFs if the configuration was not measured in this campaign.
 
 use super::averages::{CellAverage, FORCE_LINES};
 use super::cell::Measurements;
 use super::findings::{ConfigurationFindings, ImportedFrom};
 use super::missing::Missing;
-use super::{assemble, chosen, imported};
+use super::{assemble, chosen};
+use crate::campaign::store::frf_table::ImportedFrf;
 use crate::results::UsableBand;
 use crate::spectra::usable_band;
 use crate::structure::Structure;
@@ -32,7 +33,7 @@ pub fn of<M: Measurements>(
     planned: usize,
 ) -> ConfigurationFrfs {
     let mut missing = Vec::new();
-    match imported::of(measurements, configuration, own.len()) {
+    match imported_frfs(measurements, configuration, own.len()) {
         Err(why) => missing.push(why),
         Ok(None) => {}
         Ok(Some(found)) => {
@@ -101,4 +102,22 @@ fn force_band(configuration: Structure, own: &[CellAverage]) -> Option<UsableBan
         .collect();
     let band_hz = usable_band(&frequency_hz, &mean, 6.0)?;
     Some(UsableBand { configuration: configuration.into(), band_hz })
+}
+
+/// The imported FRFs of a configuration that has no averaged cell, if there are any.
+///
+/// # Errors
+/// They cannot be read; or hits were measured as well, which take precedence.
+pub fn imported_frfs<M: Measurements>(
+    measurements: &M,
+    configuration: Structure,
+    cells: usize,
+) -> Result<Option<ImportedFrf>, Missing> {
+    match measurements.imported(configuration) {
+        Err(error) => Err(Missing::ImportUnreadable { configuration, told: error.to_string() }),
+        Ok(Some(found)) if cells > 0 => {
+            Err(Missing::ImportUnused { configuration, file: found.source, cells })
+        }
+        Ok(found) => Ok(found),
+    }
 }

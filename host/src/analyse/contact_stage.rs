@@ -1,7 +1,7 @@
-//! Evaluates all measurements at the specimens: the impacts' loops, the shaker's levels, and the
-//! contact in the frequency domain.
+//! Evaluates all measurements at the specimens: the static arm (stated, from hits on B alone where
+//! the force at the contact is the hammer's, or from levels that stick), the impacts' loops, the
+//! shaker's levels, the specimens' FRFs for the report, and the contact in the frequency domain.
 
-use super::arm_from_hits::from_hits;
 use super::averages::CellAverage;
 use super::cell::Measurements;
 use super::cells_stage::Cells;
@@ -10,19 +10,22 @@ use super::checks::{HiddenResonance, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
-use super::specimen_curves::specimen_curves;
 use super::{chosen, impact_loops, shaker_levels};
 use crate::contact::{ContactError, Joint, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
 use crate::hysteresis::hammer_slip::HammerSlip;
-use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_levels};
-use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, ShakerLoop};
+use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_known_force, from_levels};
+use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, Role, ShakerLoop, rounded};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
-use crate::substructuring::BandStatistic;
 use crate::substructuring::direct::Direct;
-use crate::substructuring::geometry::{Geometry, Grouping};
+use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
+use crate::substructuring::idm::{Dof, IdmSet};
+use crate::substructuring::{BandStatistic, vpt};
+use nalgebra::Vector3;
+use num_complex::Complex;
+use std::f64::consts::TAU;
 
 /// Number of groups of hits used to distinguish a resonance from noise.
 const GROUPS: usize = 4;
@@ -95,11 +98,11 @@ pub fn at_the_contact<M: Measurements>(
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
         missing.push(Missing::EffectiveMass);
     }
-    let slip = super::hammer_slip::told(&cells.at_contact);
+    let slip = super::cells_stage::slip_under_the_hammer(&cells.at_contact);
     let slips = slip.found() == Some(true);
     let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
     let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
-    let at_levels = super::level_stiffness::of(measurements, averages, own, slips, &loops);
+    let at_levels = super::shaker_levels::k_t_of_levels(measurements, averages, own, slips, &loops);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
@@ -118,7 +121,7 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
-        joint: super::level_stiffness::together(own, &at_levels),
+        joint: super::shaker_levels::combined_with_hits(own, &at_levels),
         levels: shaker_levels::loops(steady, arm.as_ref(), at_levels),
     };
     (found, missing)
@@ -203,7 +206,7 @@ fn known_arm<M: Measurements>(
     }
     let geometry = measurements.geometry();
     let (points, at, sigma_per_s) = (&geometry.b, geometry.virtual_point_b_m, measurements.sigma_per_s());
-    from_hits(averages, points, at, sigma_per_s, known.parallel_path, missing)
+    arm_from_hits(averages, points, at, sigma_per_s, known.parallel_path, missing)
 }
 
 /// Reads the signals of the hit with the median slope once more.
@@ -224,4 +227,111 @@ fn example<M: Measurements>(
         impact_loops::drawn(shown, cell.fs_hz, contact, delays),
         inside.and_then(|f| impact_loops::rebuilt(shown, cell.fs_hz, contact, delays, f)),
     ))
+}
+
+/// Frequency range of the fit, Hz: above the hammer's drift, below the first mode of the arm on its
+/// cells.
+const FIT_HZ: [f64; 2] = [100.0, 600.0];
+
+/// Fits mass and parallel path to the hits on B alone; `None` without a complete set of them.
+///
+/// Cells whose lines differ from those of the first are reported in `missing`. The hits are
+/// transformed to the virtual point by the impacts' transformation, so that a hit away from the
+/// contact is weighted by its lever arm.
+pub fn arm_from_hits(
+    averages: &[CellAverage],
+    points: &Configuration,
+    virtual_point_m: [f64; 3],
+    sigma_per_s: f64,
+    parallel_path: Option<f64>,
+    missing: &mut Vec<Missing>,
+) -> Option<Identified> {
+    let mut hit: Vec<(&Point, CrossSpectra)> = Vec::new();
+    let mut frequency_hz: &[f64] = &[];
+    for cell in averages.iter().filter(|cell| cell.name.configuration == Structure::B) {
+        let Some(contact) = &cell.contact else { continue };
+        if frequency_hz.is_empty() {
+            frequency_hz = cell.spectra.frequency_hz();
+        }
+        let added = match hit.iter_mut().find(|(point, _)| point.name == cell.name.impact) {
+            Some((_, sum)) => sum.add(contact).is_ok(),
+            None if contact.lines() != frequency_hz.len() => false,
+            None => {
+                let point = points.impacts.iter().find(|point| point.name == cell.name.impact)?;
+                hit.push((point, contact.clone()));
+                true
+            }
+        };
+        if !added {
+            missing.push(Missing::OtherLines(cell.name.clone()));
+        }
+    }
+    if hit.is_empty() {
+        return None;
+    }
+    let impacts: Vec<Point> = hit.iter().map(|(point, _)| (*point).clone()).collect();
+    let transformation = vpt::impacts(&impacts, Vector3::from(virtual_point_m), IdmSet::Six, None).ok()?;
+    let z = IdmSet::Six.position(Dof::Z)?;
+    let lines: Vec<(Complex<f64>, Complex<f64>)> = frequency_hz
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| (FIT_HZ[0]..=FIT_HZ[1]).contains(*f))
+        .map(|(l, f)| {
+            let per_newton = |signal: usize| -> Complex<f64> {
+                hit.iter().enumerate().map(|(i, (_, sum))| sum.h1(l, signal) * transformation.t[(i, z)]).sum()
+            };
+            // the cells' sum, and B's acceleration from its velocity
+            (per_newton(2), per_newton(1) * Complex::new(sigma_per_s, TAU * f))
+        })
+        .filter(|(t, a)| t.is_finite() && a.is_finite())
+        .collect();
+    from_known_force(&lines, parallel_path)
+}
+
+/// The two specimens' receptances from one impact, their difference, and the load cells' force; hit
+/// and response are positive along +z, so `sign` is −1 for a hit towards −z.
+pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfCurve; 4] {
+    let of = |output: usize, line: usize| sign * average.h1(line, output);
+    let receptance = |output: usize| move |line: usize| of(output, line) / average.s(line);
+    [
+        curve(impact, average, (Role::SpecimenA, "x_A", Some(0)), receptance(0)),
+        curve(impact, average, (Role::SpecimenB, "x_B", Some(1)), receptance(1)),
+        curve(impact, average, (Role::Relative, "Δx", None), |line| {
+            (of(0, line) - of(1, line)) / average.s(line)
+        }),
+        curve(impact, average, (Role::Force, "T", Some(2)), |line| of(2, line)),
+    ]
+}
+
+/// One curve; its coherence is that of the measured output, if it is a measured one.
+fn curve(
+    impact: &str,
+    average: &CrossSpectra,
+    (role, output, measured): (Role, &str, Option<usize>),
+    value: impl Fn(usize) -> Complex<f64>,
+) -> FrfCurve {
+    let frequency_hz = average.frequency_hz();
+    let step_hz = if frequency_hz.len() > 1 { frequency_hz[1] - frequency_hz[0] } else { 0.0 };
+    let (magnitude_m_per_n, phase_deg) = (0..average.lines())
+        .map(value)
+        .map(|y| (rounded(y.norm(), 5), rounded(y.arg().to_degrees(), 5)))
+        .unzip();
+    let coherence = measured.filter(|_| average.hits() > 1).map_or_else(Vec::new, |i| {
+        (0..average.lines())
+            .map(|l| average.coherence(l, i))
+            .map(|c| rounded(if c.is_finite() { c } else { 0.0 }, 5))
+            .collect()
+    });
+    FrfCurve {
+        configuration: Structure::Ajb.into(),
+        role,
+        output: output.into(),
+        input: impact.into(),
+        hits: average.hits(),
+        first_hz: frequency_hz.first().copied().unwrap_or(0.0),
+        step_hz,
+        magnitude_m_per_n,
+        phase_deg,
+        coherence,
+    }
 }

@@ -5,7 +5,7 @@
 
 use super::contact_stage::Contact;
 use super::data_quality::DataQuality;
-use super::fits::Fit;
+use super::from_frfs::Fit;
 use super::from_frfs::Substructured;
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;

@@ -1,14 +1,20 @@
-//! From FRFs of A, B and the assembly to joint and interface; used for campaigns and by `identify`.
+//! From FRFs of A, B and the assembly to joint and interface; used for campaigns and by `identify`:
+//! the decoupling methods, the estimates to quote with their bootstrap over hits, and the fits of K
+//! and C to all three configurations and their noise.
 
+use super::cell::BANDS;
 use super::checks::{BackCoupled, InternalsFound, SameStructures};
-use crate::results::MAIN_BAND;
-use crate::substructuring::averaged::Priors;
+use super::missing::Missing;
+use crate::results::{Bootstrap, MAIN_BAND};
+use crate::structure::Structure;
+use crate::substructuring::averaged::{Averaged, AveragedError, CellHits, Prepared, Priors};
 use crate::substructuring::cmif::{Cmif, cmif};
 use crate::substructuring::explained::Explained;
-use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
+use crate::substructuring::fit::{FitError, Fitted, Options, fit};
+use crate::substructuring::geometry::{Configuration, Grouping, Point};
 use crate::substructuring::line_noise::LineNoise;
 use crate::substructuring::{
-    Dof, Frf, FrfError, Identification, IdmSet, JointRow, JointSpectrum, Method, Refused,
+    Band, Dof, Frf, FrfError, Geometry, Identification, IdmSet, JointRow, JointSpectrum, Method, Refused,
     VirtualPointQuality, line_noise,
 };
 use std::collections::BTreeMap;
@@ -129,4 +135,104 @@ fn without_spares(frf: &Frf, points: &Configuration) -> Frf {
     let hit: Vec<String> = frf.inputs().iter().filter(|name| !on_specimen(name)).cloned().collect();
     // the names were taken from this matrix, so the selection succeeds
     frf.select(&kept, &hit).unwrap_or_else(|_| frf.clone())
+}
+
+/// A requested fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Its interface deformation modes.
+    pub idms: IdmSet,
+    /// Its result.
+    pub outcome: Result<Fitted, NoFit>,
+}
+
+/// Why there is no fit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoFit {
+    /// FRFs that were imported into the campaign came without their variance.
+    ImportWithoutVariance,
+    /// The file of this configuration has no variance.
+    FileWithoutVariance(Structure),
+    /// The fit failed.
+    Failed(FitError),
+}
+
+/// The fit with each set of modes over each band; the FRFs are those of A, B and AJB, with their
+/// variance.
+pub fn fits(
+    [a, b, ajb]: [&Frf; 3],
+    geometry: &Geometry,
+    sets: &[IdmSet],
+    bands: &[Band],
+    options: &Options,
+) -> Vec<Fit> {
+    let of = |idms: IdmSet, band: Band| {
+        let outcome = fit(a, b, ajb, geometry, idms, band, options).map_err(NoFit::Failed);
+        Fit { idms, outcome }
+    };
+    sets.iter()
+        .flat_map(|set| bands.iter().map(move |band| (*set, *band)))
+        .map(|(set, band)| of(set, band))
+        .collect()
+}
+
+/// Seed of the bootstrap; fixed, so that the same file gives the same figures.
+const SEED: u64 = 1;
+
+/// The estimates to quote.
+#[derive(Debug, Default)]
+pub struct Recommended {
+    /// One for each band.
+    pub estimates: Vec<Averaged>,
+    /// The bootstrap over hits, for the main band.
+    pub bootstrap: Option<Bootstrap>,
+    /// Results that are not available.
+    pub missing: Vec<Missing>,
+}
+
+/// The estimates to quote, with their intervals, from the assembly only; `replicates` is the number
+/// of bootstrap replicates.
+pub fn recommended(
+    geometry: &Geometry,
+    ajb: &Frf,
+    priors: &Priors,
+    hits: &[CellHits],
+    replicates: usize,
+) -> Recommended {
+    let mut found = Recommended::default();
+    for band in BANDS {
+        match Prepared::of(ajb, geometry, IdmSet::Six, band, priors) {
+            Ok(prepared) => {
+                let estimate = prepared.estimate();
+                if replicates > 0 && band == MAIN_BAND {
+                    match draw(&prepared, &estimate, hits, replicates) {
+                        Ok(drawn) => found.bootstrap = Some(drawn),
+                        Err(error) => found.missing.push(Missing::Bootstrap(error)),
+                    }
+                }
+                found.estimates.push(estimate);
+            }
+            Err(error) => {
+                found.missing.push(Missing::Estimate(error));
+                break;
+            }
+        }
+    }
+    found
+}
+
+/// The bootstrap, and the estimate with its scatter.
+fn draw(
+    prepared: &Prepared,
+    estimate: &Averaged,
+    hits: &[CellHits],
+    replicates: usize,
+) -> Result<Bootstrap, AveragedError> {
+    let drawn = prepared.bootstrap(hits, replicates, SEED)?;
+    let joint = estimate
+        .joint
+        .iter()
+        .filter_map(|(dof, whole)| Some((*dof, whole.with_hits(drawn.get(dof)?))))
+        .collect();
+    Ok(Bootstrap { band_hz: estimate.band_hz, replicates, seed: SEED, hits: drawn, joint })
 }

@@ -11,7 +11,6 @@
 //! assembly, substructuring needs all three configurations.
 
 mod analyse_error;
-mod arm_from_hits;
 mod assemble;
 mod averages;
 mod campaign;
@@ -23,41 +22,33 @@ mod configuration_stage;
 mod contact_answer;
 mod contact_stage;
 mod data_quality;
-mod file_source;
 mod findings;
-mod fits;
 mod from_frfs;
 mod from_store;
-mod hammer_slip;
 mod impact_loops;
-mod imported;
-mod level_stiffness;
 mod measured_frfs;
 mod missing;
 mod plan_geometry;
 mod question;
-mod recommended;
 #[cfg(test)]
 mod rig_tests;
 mod shaker_levels;
 #[cfg(test)]
 mod shaker_levels_tests;
-mod specimen_curves;
-mod wanted;
 
 pub use analyse_error::AnalyseError;
 pub use averages::LINES_HZ;
 pub use campaign::analyse_measurements;
+pub use cell::{BANDS, Progress, Wanted};
 pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
 pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
-pub use fits::{Fit, NoFit, fits};
+pub use from_frfs::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
 pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
-pub use level_stiffness::NoLevelStiffness;
 pub use missing::Missing;
 pub use plan_geometry::{geometry, geometry_as_planned, places};
 pub use question::{Asked, IdmSets, Question, QuestionError};
+pub use shaker_levels::NoLevelStiffness;
 pub use shaker_levels::RecordLoops;
-pub use wanted::{BANDS, Progress, Wanted};

@@ -1,8 +1,8 @@
 //! Identification from FRFs of any source: the requests of `jointrig identify` and of the Python
 //! module, and their results.
 
-use super::fits::{Fit, NoFit, fits};
-use super::wanted::BANDS;
+use super::cell::BANDS;
+use super::from_frfs::{Fit, NoFit, fits};
 use super::{Findings, Missing, Substructured};
 use crate::results::{Joint, Results, Source};
 use crate::structure::Structure;

@@ -4,10 +4,10 @@
 use super::assemble;
 use super::campaign::analyse_measurements;
 use super::cell::{CellName, ContactDelays, ContactSignals, Hit, Measurements};
+use super::cell::{Progress, Wanted};
 use super::checks::{HiddenResonance, SeriesCompliance};
 use super::findings::Findings;
 use super::missing::Missing;
-use super::wanted::{Progress, Wanted};
 use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;

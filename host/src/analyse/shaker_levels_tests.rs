@@ -2,7 +2,7 @@
 
 use super::cell::ShakerLevel;
 use super::checks::contact_change::ContactChange;
-use super::level_stiffness::NoLevelStiffness;
+use super::shaker_levels::NoLevelStiffness;
 use super::shaker_levels::{analysed, curves, loops};
 use crate::campaign::plan::level::{Held, Level, Moment};
 use crate::hysteresis::static_arm::{CorrectionSource, Identified};
