@@ -13,8 +13,8 @@
 
 use super::config::{Errors, ImpactPoint, ResponsePoint};
 use super::key::{Stream, normal, stream};
+use super::normalized;
 use super::probe::{AXES, Probe};
-use super::unit_vector::normalized;
 
 /// True geometry of one cell.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,12 +9,12 @@ use nalgebra::DVector;
 
 use super::aim::shifted;
 use super::channels::{Channel, Measured};
-use super::code::code;
 use super::config::{FixedVibrometer, RigConfig};
-use super::delay_line::DelayLine;
+use super::converter::DelayLine;
+use super::converter::code;
 use super::key::{Stream, normal, stream};
+use super::normalized;
 use super::probe::Probe;
-use super::unit_vector::normalized;
 
 /// Errors of one fixed vibrometer.
 #[derive(Debug, Clone, PartialEq)]

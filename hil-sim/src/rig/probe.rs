@@ -1,7 +1,7 @@
 //! A direction at a point of a body, for measurement or excitation.
 
 use super::config::{BodyName, ImpactPoint, ResponsePoint, RigConfig, Spot};
-use super::unit_vector::normalized;
+use super::normalized;
 use super::{Configuration, RigError};
 
 /// Unit vectors of the axes.

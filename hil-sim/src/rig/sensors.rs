@@ -6,10 +6,10 @@
 //! the noise.
 
 use super::channels::{CHANNELS, Channel, LOAD_CELLS, VIBROMETER};
-use super::code::code;
 use super::config;
 use super::config::{Hammer, RigConfig};
-use super::delay_line::DelayLine;
+use super::converter::DelayLine;
+use super::converter::code;
 use super::flaws::Flaws;
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
