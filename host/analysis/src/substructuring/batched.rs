@@ -2,13 +2,13 @@
 //! once; lines near rank loss are recomputed one by one with pivoted decompositions.
 
 use super::decoupling::{InverseBlock, PrimalBlock};
+use super::interface_data::{MeasuredSet, Side};
 use super::interface_data::{balance, scaled};
 use super::internal_dofs::Rearrangement;
 use super::lanes::{
     LaneCell, Matrix, Pool, Reliable, inverse, lines, minus, plus, product, times, to_left_of,
 };
-use super::measured_set::{MeasuredSet, Side};
-use super::per_line::{LineRefusal, Work};
+use super::reduced::{LineRefusal, Work};
 use super::reduced::{Reduced, RefusedReason};
 use crate::parallel::prelude::*;
 use crate::vectors::wide;

@@ -2,9 +2,9 @@
 //! line by line.
 
 use super::geometry::Grouping;
+use super::interface_data::{Balanced, MeasuredSet, Side};
 use super::interface_data::{Found, InterfaceError, Measured};
 use super::lanes::{Matrix, Pool, lines, minus, times, to_left_of};
-use super::measured_set::{Balanced, MeasuredSet, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
 use pulp::Simd;

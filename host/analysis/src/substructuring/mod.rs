@@ -27,7 +27,6 @@
 //! ordered x, y, z, rx, ry, rz.
 
 pub mod averaged;
-pub mod back_coupling;
 mod batched;
 pub mod between_arms;
 pub mod cmif;
@@ -46,9 +45,7 @@ mod internal_dofs;
 pub mod joint_over_bands;
 mod lanes;
 pub mod line_noise;
-mod measured_set;
 pub mod method;
-mod per_line;
 mod product;
 pub mod pseudo_inverse;
 pub mod quality;

@@ -1,17 +1,16 @@
-//! One IDM set's virtual points with their admittances, line by line.
+//! One IDM set's virtual points with their admittances, line by line, and Z^J of a separate line by
+//! one method, for lines near rank loss or with a refusal.
 
-use super::back_coupling::BackCoupling;
+use super::coupling::BackCoupling;
 use super::decoupling::{ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock};
 use super::geometry::Grouping;
 use super::idm::IdmSet;
+use super::interface_data::{Balanced, MeasuredSet, Side};
 use super::interface_data::{InterfaceError, balance, scaled};
-use super::internal_dofs::Which;
-use super::measured_set::{Balanced, MeasuredSet, Side};
+use super::internal_dofs::{Rearrangement, Which};
 use super::method::Method;
 use super::pseudo_inverse::full_rank_inverse;
-use super::quality::VirtualPointQuality;
-use super::quality::consistency;
-use super::quality::{passivity, reciprocity};
+use super::quality::{VirtualPointQuality, consistency, passivity, reciprocity};
 use crate::band::Band;
 use crate::parallel::prelude::*;
 use crate::structure::Structure;
@@ -229,5 +228,34 @@ pub(super) fn every_line<T: Send, E>(
         Some(all) => Ok(all),
         // run in order to find the first refusal
         None => (0..lines).map(of).collect(),
+    }
+}
+
+/// The operation that a method applies to a line.
+pub(super) enum Work<'a> {
+    Internals(Box<Rearrangement<'a>>),
+    Interface,
+    Primal(PrimalBlock),
+    Inverse(InverseBlock),
+}
+
+/// Order of the computation: each stage is done for all lines before the next, which decides the
+/// refusal that is reported.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Stage {
+    Assembly,
+    Impedance,
+    Method,
+}
+
+/// The refusal of a line.
+pub(super) struct LineRefusal {
+    pub(super) stage: Stage,
+    pub(super) reason: RefusedReason,
+}
+
+impl Stage {
+    pub(super) fn refuses<R: Into<RefusedReason>>(self) -> impl Fn(R) -> LineRefusal {
+        move |reason| LineRefusal { stage: self, reason: reason.into() }
     }
 }

@@ -3,12 +3,12 @@
 use super::batched::{Job, LineResults};
 use super::decoupling::{DecouplingError, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
+use super::interface_data::{MeasuredSet, Side};
 use super::internal_dofs::Rearrangement;
-use super::measured_set::{MeasuredSet, Side};
 use super::method::Method;
-use super::per_line::{LineRefusal, Stage, Work};
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
+use super::reduced::{LineRefusal, Stage, Work};
 use super::reduced::{MethodKind, Reduced, RefusedReason};
 use nalgebra::{Complex, DMatrix};
 

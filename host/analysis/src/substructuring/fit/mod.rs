@@ -9,7 +9,7 @@
 //! The residual's covariance contains the noise of Y^AJB and, through Eq. (1)'s derivatives, of Y^A
 //! and Y^B, and errors of position, aim and angle with Gaussian priors. The modules: `block`: the
 //! measured data; `cell` and `nuisance`: its errors of geometry; `chart`: the parameters; `model`:
-//! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then `start`,
+//! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then
 //! `solver`, `outcome`.
 
 mod assembly_aims;
@@ -24,7 +24,6 @@ mod nuisance;
 mod outcome;
 mod problem;
 mod solver;
-mod start;
 mod weight;
 
 pub use chart::FreeEntries;
@@ -212,9 +211,9 @@ pub fn fit(
     options: &Options,
 ) -> Result<Fitted, FitError> {
     let problem = problem(a, b, ajb, geometry, idms, band, options)?;
-    let chart = start::chart(&problem);
+    let chart = solver::chart(&problem);
     let mut best: Option<solver::SearchResult> = None;
-    for candidate in start::candidates(&problem, &chart, idms) {
+    for candidate in solver::candidates(&problem, &chart, idms) {
         let found = match solver::search(&problem, &chart, &candidate) {
             Ok(found) => found,
             // another start may succeed
