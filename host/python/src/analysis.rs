@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use jointrig::report;
-use jointrig::report::words::headline;
+use jointrig::report::words::brief;
 use jointrig::results::Results;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -96,6 +96,6 @@ impl Analysis {
     fn __repr__(&self) -> String {
         let source = &self.found.source.file;
         let of = if source.is_empty() { String::new() } else { format!(" of {source}") };
-        format!("Analysis{of}: {}", headline::of(&self.found))
+        format!("Analysis{of}: {}", brief::headline(&self.found))
     }
 }
