@@ -16,33 +16,29 @@
 //! **Cost.** A scan of the assembly at 51.2 kHz takes about 0.1 µs; `benches/rig.rs` measures it.
 
 use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
-use fixed::FixedSensors;
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
+use sensors::FixedSensors;
 use sensors::Sensors;
 use stepper::{ScanForces, Slipping, Span, Stepper};
 
-pub use aim::Aim;
 pub use channels::{CHANNELS, Channel, Measured};
 pub use config::RigConfig;
 pub use configuration::{Configuration, Quantity};
-pub use fixed::{FixedFlaw, FixedRows};
-pub use flaws::Flaws;
 pub use hammer::{Hit, Mishap};
 pub use plant::Stepping;
+pub use probe::Aim;
 pub use probe::Probe;
+pub use sensors::Flaws;
+pub use sensors::{FixedFlaw, FixedRows};
 pub use structure::exact_frf;
 pub use truth::JointState;
 pub use truth::Truth;
 
-mod aim;
 pub(crate) mod channels;
 pub mod config;
 mod configuration;
-mod converter;
-mod fixed;
-mod flaws;
 pub mod force;
 pub mod hammer;
 mod key;
@@ -109,7 +105,7 @@ impl Rig {
         let flaws = Flaws::new(seed, config, &ten);
         let sensors = Sensors::new(config, &ten, &flaws, None, stream(seed, &["at rest"]));
         let fixed = FixedSensors::new(config, &flaws.fixed, flaws.latency_scans, stream(seed, &["at rest"]));
-        let channels: Vec<Channel> = ten.into_iter().chain(fixed::channels(config)).collect();
+        let channels: Vec<Channel> = ten.into_iter().chain(sensors::fixed_channels(config)).collect();
         let configuration = Configuration::Ajb;
         // check() has verified that there is at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);

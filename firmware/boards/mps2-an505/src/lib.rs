@@ -13,7 +13,6 @@
 pub mod device;
 mod executor;
 mod fault;
-pub mod lines;
 pub mod memory;
 pub mod port;
 mod time;

@@ -9,8 +9,8 @@
 //! specimens that remains from earlier slip. A scan in which an element would slip is undone and
 //! repeated in steps.
 
-use super::fixed::FixedRows;
 use super::force::ForceSegment;
+use super::sensors::FixedRows;
 use super::sliders::Sliders;
 use nalgebra::DVector;
 

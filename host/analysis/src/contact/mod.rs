@@ -19,8 +19,7 @@
 //!
 //! Modules, in order of use:
 //!
-//! - `cell`: the measured signals
-//! - `block`: the cells of an impact
+//! - `block`: the measured signals of each cell, and the cells of an impact
 //! - `parameters`: the unknowns
 //! - `model`: the signals as a linear map of the motion; `line`: its elimination
 //! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell beyond
@@ -33,7 +32,6 @@
 use std::f64::consts::TAU;
 
 mod block;
-mod cell;
 mod diagnosis;
 mod driven;
 mod joint;
@@ -48,7 +46,7 @@ mod solver;
 #[cfg(test)]
 mod tests;
 
-pub use cell::{ContactCell, SIGMA_PER_S};
+pub use block::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, SignalResidual};
 pub use joint::{Joint, joint};
 pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};

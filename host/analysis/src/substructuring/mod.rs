@@ -51,7 +51,6 @@ pub mod pseudo_inverse;
 pub mod quality;
 mod reduced;
 pub mod semm;
-mod solve;
 pub mod virtual_points;
 pub mod vpt;
 

@@ -8,7 +8,7 @@
 //!
 //! The residual's covariance contains the noise of Y^AJB and, through Eq. (1)'s derivatives, of Y^A
 //! and Y^B, and errors of position, aim and angle with Gaussian priors. The modules: `block`: the
-//! measured data; `cell` and `nuisance`: its errors of geometry; `chart`: the parameters; `model`:
+//! measured data; `cell`: its errors of geometry; `chart`: the parameters; `model`:
 //! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then
 //! `solver`, `outcome`.
 
@@ -20,7 +20,6 @@ mod factor;
 mod model;
 mod narrow;
 mod noise;
-mod nuisance;
 mod outcome;
 mod problem;
 mod solver;
@@ -38,8 +37,8 @@ use crate::frf::Frf;
 use crate::frf::noise::shared_by_lines;
 use crate::structure::Structure;
 use block::{ReceptanceBlock, Side};
+use cell::Nuisances;
 use model::Layout;
-use nuisance::Nuisances;
 use problem::Problem;
 use serde::Serialize;
 use std::collections::BTreeMap;
