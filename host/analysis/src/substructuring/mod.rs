@@ -20,7 +20,8 @@
 //! 9. [`coupling`]: the inverse problem, from parts to the assembly; [`cmif`](mod@cmif): how many
 //!    modes the interface needs; [`BackCoupling`](coupling::BackCoupling): whether the identified
 //!    joint reproduces the measured assembly, and [`explained`]: which errors may prevent it;
-//!    [`quality`] also checks passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
+//!    [`quality`] also checks passivity and reciprocity; [`semm`](mod@semm): a model corrected by a
+//!    measurement.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it
 //! is exact on s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are
