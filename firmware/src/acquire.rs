@@ -6,7 +6,7 @@
 //! carried out immediately afterwards.
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use jointrig_hot::range;
+use jointrig_hot::codes;
 use jointrig_protocol::block::{OVER_RANGE, TRIGGER};
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
 
@@ -18,7 +18,7 @@ use crate::state::State;
 
 /// Unsent blocks at which the transmit task is woken: waking it costs a tenth of the processing of
 /// a block, and no block is that urgent. A smaller remainder is sent after the next period of
-/// [`crate::watch`], at most 0.1 s later.
+/// [`crate::safety`], at most 0.1 s later.
 const BLOCKS_PER_WAKE: u64 = 4;
 
 /// Runs forever.
@@ -151,7 +151,7 @@ impl<M: RawMutex> Core<'_, M> {
         let channels = self.facts.channels.len();
         let (pairs, _) = samples.as_chunks::<2>();
         let pairs = &pairs[..(usize::from(delivered.scans) * channels).min(pairs.len())];
-        let over = delivered.loud && range::is_over(pairs);
+        let over = delivered.loud && codes::is_over(pairs);
         self.with(|state| {
             let given = state.take(delivered, channels, pairs, over, samples, codes);
             let send = state.unsent_blocks() >= BLOCKS_PER_WAKE || state.has_words();

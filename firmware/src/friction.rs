@@ -4,7 +4,7 @@
 //! (N), and T is the sum of the three. Since T is linear in the readings, the column sums of the
 //! matrix are computed once, and each scan costs three multiplications.
 
-use jointrig_hot::column;
+use jointrig_hot::codes;
 use jointrig_protocol::channel::{Channel, Role};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
@@ -65,7 +65,7 @@ impl Friction {
     /// The mean of T over some scans with `channels` channels each, N. The raw codes are summed,
     /// since T is linear in them.
     pub fn mean_of(&self, codes: &[[u8; 2]], channels: usize) -> f32 {
-        let sums = self.places.map(|place| column::sum(codes, channels, place) as f32);
+        let sums = self.places.map(|place| codes::sum(codes, channels, place) as f32);
         (self.weights * Vector3::from(sums)).x * channels as f32 / codes.len() as f32
     }
 

@@ -23,8 +23,8 @@ use jointrig_protocol::shot::{Phase, Shot};
 use crate::friction::Friction;
 use crate::pulse::Pulse;
 use crate::quiet::Quiet;
+use crate::ruler::{ms_of_scans, scans_in_ms};
 use crate::scales::{UnitsPerCode, as_built};
-use crate::scan_time::{ms_of_scans, scans_in_ms};
 
 /// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is slightly
 /// shorter (docs/WIRING.md): a pulse within that pause would be suppressed in hardware, so the shot

@@ -11,7 +11,7 @@ use jointrig_protocol::request;
 use crate::Core;
 use crate::board::{ByteSource, Stage};
 use crate::fmt::{info, warning};
-use crate::memory::Seen;
+use crate::state::Seen;
 use crate::state::State;
 
 /// Runs forever.

@@ -19,8 +19,8 @@ use jointrig_protocol::limits::{MAX_CHANNELS, SHAKE_RAMP_MS, SHAKE_SCANS_PER_CYC
 use jointrig_protocol::request::{Control, Shake};
 
 use crate::hammer::Scanned;
+use crate::ruler::scans_in_ms;
 use crate::scales::{UnitsPerCode, as_built};
-use crate::scan_time::scans_in_ms;
 use crate::servo::{Gauges, Servo, Trouble, sine};
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,33 +1,35 @@
-//! The state shared by the tasks: one [`Core`] behind one mutex, and two signals that wake other
-//! tasks.
-
-use core::cell::RefCell;
-
-use embassy_sync::blocking_mutex::Mutex;
-use embassy_sync::blocking_mutex::raw::RawMutex;
-use embassy_sync::signal::Signal;
-use heapless::{Deque, String};
-use jointrig_protocol::acknowledge::Acknowledge;
-use jointrig_protocol::answer::{self, Answer, Counters, Info, Refusal, Reset, Status};
-use jointrig_protocol::block::RESENT;
-use jointrig_protocol::channel::{Channel, Name};
-use jointrig_protocol::event::{self, Event, Loss, Reason};
-use jointrig_protocol::hello::Hello;
-use jointrig_protocol::limits::{self, BLOCK_SAMPLE_BYTES};
-use jointrig_protocol::shot::Phase;
-use jointrig_protocol::sync::Line;
-use nalgebra::Matrix3;
+//! The state shared by the tasks: one [`Core`] behind one mutex, two signals that wake other tasks,
+//! and the stored replies that make requests idempotent.
+//!
+//! A host repeats a request with the same number until it receives a reply. A request that was
+//! already carried out is answered from here without acting again; a number too old to be
+//! recognised as a repeat is refused.
 
 use crate::fmt::warning;
 use crate::friction::Friction;
 use crate::hammer::{Outcome, Scanned};
 use crate::logs::Tap;
-use crate::memory::{Memory, Seen};
 use crate::ring::{CHANNEL_MAP, Out, Range, Ring, Slot};
 use crate::ruler::InStep;
 use crate::safety::Safety;
 use crate::scales::{UnitsPerCode, as_built, as_told};
 use crate::sentence::{Sentence, Tell, out_of_bounds};
+use core::cell::RefCell;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_sync::signal::Signal;
+use heapless::{Deque, String};
+use jointrig_protocol::acknowledge::Acknowledge;
+use jointrig_protocol::answer::{Answer, Counters, Info, Numbered, Refusal, Reset, Status};
+use jointrig_protocol::block::RESENT;
+use jointrig_protocol::channel::{Channel, Name};
+use jointrig_protocol::event::{Event, Loss, Reason};
+use jointrig_protocol::hello::Hello;
+use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
+use jointrig_protocol::shot::Phase;
+use jointrig_protocol::sync::Line;
+use jointrig_protocol::{answer, event, limits};
+use nalgebra::Matrix3;
 
 /// Capacity for replies waiting for the link.
 const ANSWERS: usize = 8;
@@ -566,6 +568,89 @@ impl State<'_> {
     }
 }
 
+/// Number of stored replies. A host has one outstanding request at a time; eight cover any
+/// reordering of repeats.
+pub const REMEMBERED: usize = 8;
+
+/// How to treat a request with a given number.
+#[derive(Debug, PartialEq)]
+pub enum Seen {
+    /// Not carried out yet: do it.
+    New,
+    /// Already carried out: send this reply again.
+    Before(Numbered),
+    /// Too old to decide.
+    Stale,
+}
+
+/// The last replies of one session.
+#[derive(Default)]
+pub struct Memory {
+    answers: Deque<Numbered, REMEMBERED>,
+}
+
+impl Memory {
+    /// Empty: a new session.
+    pub const fn new() -> Self {
+        Self { answers: Deque::new() }
+    }
+
+    /// Looks up a number.
+    pub fn look_up(&self, number: u32) -> Seen {
+        if let Some(answer) = self.answers.iter().find(|answer| answer.number == number) {
+            return Seen::Before(answer.clone());
+        }
+        // when full, a number lower than all stored ones may have been carried out and removed
+        let forgotten = self.answers.is_full() && self.answers.iter().all(|answer| number < answer.number);
+        if forgotten { Seen::Stale } else { Seen::New }
+    }
+
+    /// Stores a reply; removes the oldest when full.
+    pub fn keep(&mut self, answer: &Numbered) {
+        if self.answers.is_full() {
+            self.answers.pop_front();
+        }
+        // there is space: the oldest was removed if necessary
+        let _ = self.answers.push_back(answer.clone());
+    }
+}
+
 #[cfg(test)]
 #[path = "state_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+mod memory_tests {
+    use super::*;
+    use jointrig_protocol::answer::{Answer, Refusal};
+
+    fn answer(number: u32) -> Numbered {
+        Numbered {
+            number,
+            outcome: if number.is_multiple_of(2) { Ok(Answer::Done) } else { Err(Refusal::Busy) },
+        }
+    }
+
+    #[test]
+    fn a_repeat_is_answered_from_memory_and_an_old_number_is_stale() {
+        let mut memory = Memory::new();
+        assert_eq!(memory.look_up(1), Seen::New);
+        for number in 1..=20 {
+            assert_eq!(memory.look_up(number), Seen::New);
+            memory.keep(&answer(number));
+            assert_eq!(memory.look_up(number), Seen::Before(answer(number)));
+        }
+        assert_eq!(memory.look_up(13), Seen::Before(answer(13)));
+        assert_eq!(memory.look_up(12), Seen::Stale);
+        assert_eq!(memory.look_up(1), Seen::Stale);
+    }
+
+    #[test]
+    fn a_late_request_that_was_never_carried_out_is_new() {
+        let mut memory = Memory::new();
+        for number in [1, 2, 4, 5] {
+            memory.keep(&answer(number));
+        }
+        assert_eq!(memory.look_up(3), Seen::New);
+    }
+}

@@ -2,8 +2,9 @@
 //! limit.
 
 use crate::command;
-use crate::environment::{self, environment};
 use crate::project::Project;
+use crate::python;
+use crate::python::environment;
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::Path;
@@ -27,7 +28,7 @@ pub fn run(project: &Project, parts: &[String]) -> Result<()> {
         bail!("there is no Python for the peers: install python3 with its venv module");
     };
     let python = environment(&system, &project.target.join("parity-python"), &[])?;
-    environment::with_peers(&python)?;
+    python::with_peers(&python)?;
     let only_growth = parts == ["growth"];
     let times = if only_growth { None } else { Some(measured(project, &python, "jointrig-benches", parts)?) };
     let growth =

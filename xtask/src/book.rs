@@ -2,8 +2,8 @@
 //! `target/book`.
 
 use crate::command;
-use crate::consent::Consent;
 use crate::layout::pages;
+use crate::packages::Consent;
 use crate::project::Project;
 use anyhow::{Context, Result};
 use pulldown_cmark::{Event, Options, Parser, Tag, html};

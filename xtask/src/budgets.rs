@@ -4,7 +4,7 @@
 //! must agree exactly. Instructions are not cycles, and another compiler gives other counts: the
 //! limits have a margin for that.
 
-use crate::consent::Consent;
+use crate::packages::Consent;
 use crate::project::{EMULATED_BOARD, Project, WIRED_BOARD};
 use crate::toolchain::Toolchain;
 use crate::{emulator, firmware, setup, size};

@@ -1,8 +1,8 @@
 //! QEMU: the same processor core as the rig's controller, without the rig.
 
-use crate::consent::Consent;
+use crate::packages::Consent;
+use crate::packages::EMULATOR;
 use crate::project::{EMULATED_BOARD, Project};
-use crate::qemu::PROGRAM;
 use crate::{command, firmware, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -39,7 +39,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     } else {
         firmware::build_board(project, &toolchain, EMULATED_BOARD)?
     };
-    let mut qemu = Command::new(PROGRAM);
+    let mut qemu = Command::new(EMULATOR);
     qemu.args(arguments(&image, options)?);
     command::run(&mut qemu).context("the emulated board did not end well")
 }
@@ -47,7 +47,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
 /// Runs an image with one argument and returns its output.
 pub fn listen(image: &Path, argument: &str, icount: bool) -> Result<String> {
     let options = Options { icount, image_arguments: vec![argument.to_owned()], ..Options::default() };
-    let mut qemu = Command::new(PROGRAM);
+    let mut qemu = Command::new(EMULATOR);
     qemu.args(arguments(image, &options)?);
     println!("  $ {}", command::line(&qemu));
     command::output(&mut qemu).context("the emulated board did not end well")

@@ -1,7 +1,7 @@
 //! Writes the image to the rig's controller.
 
-use crate::consent::Consent;
 use crate::firmware;
+use crate::packages::Consent;
 use crate::project::Project;
 use crate::{command, setup};
 use anyhow::{Context, Result, bail};

@@ -1,40 +1,31 @@
 //! `cargo xtask`: all tasks for contributors in one command.
 //!
-//! Each task has one line here and a separate file: [`setup`] prepares the machine, [`suite`] is
-//! the whole test run, [`firmware`] builds for the microcontroller. The exit code is 0 for success,
-//! 1 when a step failed (the message states what, where and what to do), 2 for an invalid command
-//! line.
+//! Each task has one line here, and its code in the file of its subject: [`setup`] prepares the
+//! machine, [`suite`] is the whole test run, [`firmware`] builds for the microcontroller. The exit
+//! code is 0 for success, 1 when a step failed (the message states what, where and what to do), 2
+//! for an invalid command line.
 
 mod accuracy;
 mod bench;
 mod book;
 mod budgets;
-mod chromium;
 mod command;
-mod consent;
 mod emulator;
-mod environment;
 mod firmware;
 mod flash;
-mod flat;
-mod jobs;
 mod layout;
 mod lint;
-mod locks;
 mod packages;
 mod parity;
 mod project;
 mod python;
-mod qemu;
 mod sbom;
 mod setup;
 mod size;
 mod suite;
 mod sysroot;
-mod test_programs;
 mod tests_run;
 mod toolchain;
-mod wheels;
 
 use clap::{Parser, Subcommand};
 use project::Project;
@@ -139,7 +130,7 @@ fn main() -> ExitCode {
 fn run(task: Task) -> anyhow::Result<()> {
     let project = Project::locate()?;
     match task {
-        Task::Setup { yes } => setup::everything(&project, consent::Consent::new(yes)).map(drop),
+        Task::Setup { yes } => setup::everything(&project, packages::Consent::new(yes)).map(drop),
         Task::Firmware { board } => firmware::command(&project, board.as_deref()),
         Task::FmtCheck => lint::formatting(&project),
         Task::Lint => lint::all(&project),
@@ -149,8 +140,8 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
         Task::Python => python::run(&project).map(|remark| println!("{remark}")),
-        Task::Wheels => wheels::run(&project),
-        Task::Book { yes } => book::run(&project, consent::Consent::new(yes)),
+        Task::Wheels => python::run_release(&project),
+        Task::Book { yes } => book::run(&project, packages::Consent::new(yes)),
         Task::Sbom => sbom::run(&project),
         Task::Parity => parity::run(&project),
         Task::Accuracy { tables } => accuracy::run(&project, &tables),

@@ -4,8 +4,9 @@
 //! does not need them.
 
 use crate::command;
-use crate::environment::{self, environment};
 use crate::project::Project;
+use crate::python;
+use crate::python::environment;
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 
@@ -27,6 +28,6 @@ fn python(project: &Project) -> Result<PathBuf> {
     };
     let python = environment(&system, &project.target.join("parity-python"), &[])?;
     println!("pyFBS is installed without its dependencies: of it, only virtual points and SEMM are compared");
-    environment::with_peers(&python)?;
+    python::with_peers(&python)?;
     Ok(python)
 }

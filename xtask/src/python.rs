@@ -1,11 +1,15 @@
-//! `cargo xtask python`: the wheel is built, installed into empty environments, and tested there,
-//! not in the source tree.
+//! Python: `cargo xtask python` builds the wheel, installs it into empty environments and tests it
+//! there, not in the source tree; `cargo xtask wheels` builds the wheels of a release.
 //!
-//! Python and its packages are only for this check, in folders under `target/`; jointrig itself
+//! Python and its packages are only for these checks, in folders under `target/`; jointrig itself
 //! does not need them.
+//!
+//! The wheels of a release are for the Linux systems of laboratories. The wheel of `cargo xtask
+//! python` needs the C library of the machine that built it. The released ones need only glibc 2.17
+//! (manylinux2014): maturin links them with Zig's linker, for x86-64 and for aarch64. They are only
+//! built here; of the two, only the first could also be run.
 
 use crate::command;
-use crate::environment::{self, environment, pip};
 use crate::project::Project;
 use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
@@ -159,7 +163,7 @@ impl Tests<'_> {
     /// takes half a gigabyte.
     fn with_others(&self, system: &Path) -> Result<()> {
         let python = environment(system, &self.folder.join("others"), &OTHERS)?;
-        environment::with_peers(&python)?;
+        with_peers(&python)?;
         pip(&python, &["uninstall", "--quiet", "--yes"], &["jointrig"])?;
         self.install(&python)?;
         self.pytest(&python, &["with_others"])?;
@@ -192,4 +196,109 @@ impl Tests<'_> {
         pytest.env("JOINTRIG_BIN", self.project.target.join("release").join(command));
         command::run(&mut pytest).context("the wheel failed its tests")
     }
+}
+
+/// The packages with which jointrig is compared, in the versions of the last successful comparison,
+/// and their dependencies.
+const PEERS: [&str; 7] = ["numpy", "pyFRF==1.5.0", "pyuff==2.5.8", "scipy", "pandas", "openpyxl", "tqdm"];
+
+/// Installed without its dependencies: virtual points and SEMM need only the packages named above,
+/// while the rest (3D views with pyvista and Qt, Ansys readers) takes a gigabyte and often cannot
+/// be installed.
+const WITHOUT_DEPENDENCIES: [&str; 1] = ["pyFBS==1.0.7"];
+
+/// Installs the peers.
+pub fn with_peers(python: &Path) -> Result<()> {
+    pip(python, &["install", "--quiet"], &PEERS)?;
+    pip(python, &["install", "--quiet", "--no-deps"], &WITHOUT_DEPENDENCIES)
+}
+
+/// The interpreter of an environment with these packages; creates the environment if necessary.
+pub fn environment(system: &Path, folder: &Path, packages: &[&str]) -> Result<PathBuf> {
+    let interpreter = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
+    if !interpreter.is_file() {
+        command::run(Command::new(system).args(["-m", "venv"]).arg(folder))
+            .context("the environment cannot be made: on Debian, install python3-venv")?;
+    }
+    if !packages.is_empty() {
+        pip(&interpreter, &["install", "--quiet"], packages)?;
+    }
+    Ok(interpreter)
+}
+
+/// Runs pip.
+pub fn pip<T: AsRef<std::ffi::OsStr>>(python: &Path, how: &[&str], packages: &[T]) -> Result<()> {
+    command::run(
+        Command::new(python).args(["-m", "pip", "--disable-pip-version-check"]).args(how).args(packages),
+    )
+    .context("the packages cannot be installed")
+}
+
+/// Target machines of a release's wheels.
+const TARGETS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"];
+
+/// Old enough for typical computers at a rig.
+const COMPATIBILITY: &str = "manylinux2014";
+
+/// The packages that build and link them.
+const RELEASE_TOOLS: [&str; 2] = ["maturin>=1.9,<2", "ziglang"];
+
+/// Builds a wheel for each target into `target/release-wheels`.
+pub fn run_release(project: &Project) -> Result<()> {
+    let missing: Vec<&str> = TARGETS.into_iter().filter(|target| !installed(target)).collect();
+    if !missing.is_empty() {
+        let missing = missing.join(" ");
+        bail!(
+            "the compiler has no standard library for {missing}: `rustup target add {missing}`, then again"
+        );
+    }
+    let found = interpreters();
+    let Some((_, interpreter)) = found.last_key_value() else {
+        bail!("maturin needs a Python of {}.{} or newer, and there is none", OLDEST.0, OLDEST.1)
+    };
+    let tools = environment(interpreter, &project.target.join("python/wheels-tools"), &RELEASE_TOOLS)
+        .context("no environment with maturin and ziglang can be made; pip needs its registry")?;
+    let out = project.target.join("release-wheels");
+    for target in TARGETS {
+        println!("wheel for {target}, {COMPATIBILITY}");
+        build_release(project, &tools, interpreter, target, &out)?;
+    }
+    let mut built: Vec<_> = fs::read_dir(&out)?.flatten().map(|entry| entry.path()).collect();
+    built.sort();
+    for wheel in built {
+        let bytes = fs::metadata(&wheel)?.len();
+        println!("{} ({:.1} MB)", wheel.display(), bytes as f64 / 1e6);
+        if bytes > WHEEL {
+            bail!("it has {bytes} bytes, and {WHEEL} are allowed");
+        }
+    }
+    Ok(())
+}
+
+/// Whether the compiler can build for that target.
+fn installed(target: &str) -> bool {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let asked = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
+    asked.is_ok_and(|said| {
+        said.status.success() && Path::new(String::from_utf8_lossy(&said.stdout).trim()).is_dir()
+    })
+}
+
+fn build_release(
+    project: &Project,
+    tools: &Path,
+    interpreter: &Path,
+    target: &str,
+    out: &Path,
+) -> Result<()> {
+    let mut maturin = Command::new(tools.with_file_name("maturin"));
+    maturin.current_dir(project.root.join("host/python"));
+    maturin.args(["build", "--release", "--locked", "--zig", "--compatibility", COMPATIBILITY]);
+    maturin.args(FOR_SIZE).args(["--target", target, "--out"]).arg(out).arg("--interpreter").arg(interpreter);
+    // maturin looks for Zig in the first Python on PATH
+    let own = tools.parent().context("an environment has a folder of programs")?;
+    let before = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::iter::once(own.to_path_buf()).chain(std::env::split_paths(&before));
+    maturin.env("PATH", std::env::join_paths(path)?).env("CARGO_TARGET_DIR", &project.target);
+    command::run(&mut maturin).with_context(|| format!("the wheel for {target} cannot be built"))
 }

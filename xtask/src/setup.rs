@@ -1,9 +1,8 @@
 //! `cargo xtask setup`: installs once what the machine needs in addition to a Rust compiler.
 
-use crate::consent::Consent;
+use crate::packages::{self, Consent};
 use crate::project::Project;
 use crate::toolchain::{self, Mode, Toolchain};
-use crate::{chromium, qemu};
 use anyhow::Result;
 
 /// The available choice, shown by `--help`.
@@ -17,8 +16,8 @@ JOINTRIG_FIRMWARE_TOOLCHAIN chooses the compiler for the microcontroller:
 /// target.
 pub fn everything(project: &Project, consent: Consent) -> Result<Toolchain> {
     let toolchain = target(project, consent)?;
-    qemu::ensure(consent)?;
-    chromium::ensure(consent)?;
+    packages::ensure_emulator(consent)?;
+    packages::ensure_browser(consent)?;
     Ok(toolchain)
 }
 

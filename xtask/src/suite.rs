@@ -1,7 +1,7 @@
 //! `cargo xtask test`: all checks, in order, with a table at the end.
 
-use crate::consent::Consent;
 use crate::firmware;
+use crate::packages::Consent;
 use crate::project::{EMULATED_BOARD, Project};
 use crate::tests_run::{self, Scope};
 use crate::toolchain::Toolchain;

@@ -12,8 +12,8 @@
 //! when complete: a folder with the final name is always complete, even after an interruption.
 
 use crate::command;
-use crate::consent::Consent;
 use crate::packages;
+use crate::packages::Consent;
 use crate::project::{Project, TARGET};
 use anyhow::{Context, Result, bail};
 use std::fs;

@@ -1,14 +1,16 @@
-//! Building and running the tests and examples of the root workspace.
+//! Building the tests and examples of the root workspace, and running the built programs without
+//! cargo.
 //!
 //! Everything uses the release profile. The whole-system scenarios simulate minutes of sixteen
 //! channels and need its speed, and a second profile would compile every dependency twice. Binaries
 //! and tests are built by one command, because only then do their dependencies have the same
 //! features and are compiled once.
 
-use crate::jobs::{self, Ended};
+use crate::command;
+use crate::command::{Ended, Job};
 use crate::project::Project;
-use crate::{command, test_programs};
 use anyhow::{Context, Result, bail};
+use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -62,7 +64,7 @@ pub fn build(project: &Project, scope: Scope) -> Result<()> {
 pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> {
     if !extra.is_empty() {
         let mut cargo = command::cargo(&project.root);
-        cargo.envs(programs(project)?);
+        cargo.envs(variables(project)?);
         cargo.args(["test", "--release", "--workspace"]).args(left_out(scope)).args(extra);
         let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;
         if !success {
@@ -70,12 +72,12 @@ pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> 
         }
         return Ok(counts);
     }
-    let mut jobs = test_programs::tests(project, left_out(scope))?;
-    jobs.extend(test_programs::examples(project)?);
+    let mut jobs = tests(project, left_out(scope))?;
+    jobs.extend(examples(project)?);
     for job in &mut jobs {
-        job.command.envs(programs(project)?);
+        job.command.envs(variables(project)?);
     }
-    concluded(&jobs::run(jobs, jobs::at_once(), &mut std::io::stdout())?)
+    concluded(&command::run_all(jobs, command::at_once(), &mut std::io::stdout())?)
 }
 
 /// Adds up the programs' reports, or fails with the names of the failed tests.
@@ -106,7 +108,7 @@ fn concluded(ended: &[Ended]) -> Result<Counts> {
 }
 
 /// The variables with the paths of the programs that scenarios start.
-fn programs(project: &Project) -> Result<Vec<(&'static str, PathBuf)>> {
+fn variables(project: &Project) -> Result<Vec<(&'static str, PathBuf)>> {
     let mut variables = Vec::new();
     for (package, binary, variable) in PROGRAMS {
         variables.extend(program(project, package, binary)?.map(|path| (variable, path)));
@@ -122,7 +124,7 @@ const IN_EMULATOR: &str = "qemu";
 /// Runs the tests of the emulated board.
 pub fn run_in_emulator(project: &Project, image: &Path) -> Result<Counts> {
     let mut cargo = command::cargo(&project.root);
-    cargo.env(IMAGE, image).envs(programs(project)?);
+    cargo.env(IMAGE, image).envs(variables(project)?);
     // `--workspace`, so that the dependencies have the features they were built with
     cargo.args(["test", "--release", "--workspace", "--test", IN_EMULATOR]);
     let (counts, success) = watched(&mut cargo, &mut std::io::stdout())?;
@@ -187,10 +189,110 @@ fn count(line: &str, counts: &mut Counts) {
     }
 }
 
+/// The programs that take longest, by package and target, the longest first. They start first, so
+/// that none of them runs alone at the end.
+const LONGEST: [(&str, &str); 3] = [("jointrig-tests", "it"), ("jointrig", "it"), ("jointrig-tests", "qemu")];
+
+/// One test program.
+#[derive(Debug, PartialEq, Eq)]
+struct Program {
+    package: String,
+    target: String,
+    /// The folder of its package, in which `cargo test` would start it.
+    folder: PathBuf,
+    path: PathBuf,
+}
+
+/// Every test program, and the documentation tests, the longest first. `selection` is passed to
+/// cargo.
+pub fn tests(project: &Project, selection: &[&str]) -> Result<Vec<Job>> {
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["test", "--no-run", "--release", "--workspace", "--message-format=json-render-diagnostics"]);
+    let mut programs = programs(&command::output(cargo.args(selection))?)?;
+    if programs.is_empty() {
+        bail!("cargo built no test program");
+    }
+    programs.sort_by_key(|program| place(&program.package, &program.target));
+    let mut jobs = vec![documentation(project, selection)];
+    jobs.extend(programs.into_iter().map(|program| {
+        let mut command = command::without_own_package(&program.path);
+        command.current_dir(&program.folder);
+        command.env("CARGO_MANIFEST_DIR", &program.folder).env("CARGO_PKG_NAME", &program.package);
+        Job { name: format!("{} {}", program.package, program.target), command }
+    }));
+    Ok(jobs)
+}
+
+/// The documentation tests, which only cargo can compile and run.
+fn documentation(project: &Project, selection: &[&str]) -> Job {
+    let mut command = command::cargo(&project.root);
+    command.args(["test", "--doc", "--release", "--workspace"]).args(selection);
+    Job { name: "documentation tests".into(), command }
+}
+
+/// Every example of the workspace, started without arguments in the repository's root, as a new
+/// user would.
+pub fn examples(project: &Project) -> Result<Vec<Job>> {
+    let mut jobs = Vec::new();
+    for package in &project.packages {
+        for example in &package.examples {
+            let path = project
+                .target
+                .join("release/examples")
+                .join(example)
+                .with_extension(std::env::consts::EXE_EXTENSION);
+            if !path.is_file() {
+                bail!("the example {example} of {} was not built as {}", package.name, path.display());
+            }
+            let mut command = command::without_own_package(&path);
+            command.current_dir(&project.root);
+            jobs.push(Job { name: format!("{} example {example}", package.name), command });
+        }
+    }
+    Ok(jobs)
+}
+
+/// Position of a program in the order.
+fn place(package: &str, target: &str) -> usize {
+    LONGEST.iter().position(|long| *long == (package, target)).unwrap_or(LONGEST.len())
+}
+
+/// The test programs in cargo's messages, one JSON object per line.
+fn programs(messages: &str) -> Result<Vec<Program>> {
+    let mut programs = Vec::new();
+    for line in messages.lines() {
+        let message: Value = serde_json::from_str(line).with_context(|| format!("cargo said: {line}"))?;
+        let Some(path) = message["executable"].as_str().filter(|_| message["profile"]["test"] == true) else {
+            continue;
+        };
+        let text =
+            |value: &Value| value.as_str().map(String::from).with_context(|| format!("cargo said: {line}"));
+        let manifest = text(&message["manifest_path"])?;
+        let folder = Path::new(&manifest).parent().context("a manifest stands in a folder")?.to_path_buf();
+        programs.push(Program {
+            package: package(&text(&message["package_id"])?),
+            target: text(&message["target"]["name"])?,
+            folder,
+            path: PathBuf::from(path),
+        });
+    }
+    Ok(programs)
+}
+
+/// The name in `path+file:///folder/name#0.1.0` or `path+file:///folder#name@0.1.0`.
+fn package(id: &str) -> String {
+    let (address, end) = id.rsplit_once('#').unwrap_or((id, ""));
+    let name = match end.split_once('@') {
+        Some((name, _)) => name,
+        None => address.rsplit('/').next().unwrap_or(address),
+    };
+    name.to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::Job;
+    use crate::command::Job;
 
     #[test]
     fn closing_lines_are_added_up_and_others_ignored() {
@@ -212,7 +314,7 @@ mod tests {
         let ended = |script: &str| {
             let mut command = Command::new("sh");
             command.args(["-c", script]);
-            jobs::run(vec![Job { name: "host demo".into(), command }], 1, &mut Vec::new())
+            command::run_all(vec![Job { name: "host demo".into(), command }], 1, &mut Vec::new())
                 .expect("sh is there")
         };
         let passed = ended("echo 'test a::b ... ok'; echo 'test result: ok. 1 passed; 0 failed; 0 ignored'");
@@ -236,5 +338,44 @@ mod tests {
         let (counts, success) = watched(&mut command, &mut shown).expect("sh is there");
         assert_eq!(shown, b"test result: FAILED. 1 passed; 1 failed; 0 ignored\n");
         assert_eq!((counts.passed, counts.failed, success), (1, 1, false));
+    }
+}
+
+#[cfg(test)]
+mod test_programs_tests {
+    use super::*;
+
+    #[test]
+    fn test_programs_are_found_among_the_messages() {
+        let messages = concat!(
+            r#"{"reason":"compiler-artifact","package_id":"registry#serde@1.0.0","profile":{"test":false},"executable":null}"#,
+            "\n",
+            r#"{"reason":"compiler-artifact","package_id":"path+file:///r/tests#jointrig-tests@0.1.0","#,
+            r#""manifest_path":"/r/tests/Cargo.toml","target":{"name":"demo","kind":["test"]},"#,
+            r#""profile":{"test":true},"executable":"/t/demo-1"}"#,
+            "\n",
+            r#"{"reason":"build-finished","success":true}"#,
+        );
+        let expected = Program {
+            package: "jointrig-tests".into(),
+            target: "demo".into(),
+            folder: "/r/tests".into(),
+            path: "/t/demo-1".into(),
+        };
+        assert_eq!(programs(messages).expect("messages of cargo"), [expected]);
+        assert!(programs("warning: no JSON").is_err());
+    }
+
+    #[test]
+    fn a_package_is_named_by_its_id_in_both_forms() {
+        assert_eq!(package("path+file:///r/xtask#0.1.0"), "xtask");
+        assert_eq!(package("path+file:///r/host#jointrig@0.1.0"), "jointrig");
+    }
+
+    #[test]
+    fn the_longest_come_first() {
+        assert_eq!(place("jointrig-tests", "it"), 0);
+        assert!(place("jointrig", "it") < place("jointrig", "jointrig"));
+        assert_eq!(place("jointrig-protocol", "it"), LONGEST.len());
     }
 }

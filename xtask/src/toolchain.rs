@@ -5,7 +5,7 @@
 //! `core` from its own sources once; see [`crate::sysroot`]. The variable [`MODE_VARIABLE`] selects
 //! the way.
 
-use crate::consent::Consent;
+use crate::packages::Consent;
 use crate::project::{Project, TARGET};
 use crate::{command, packages, sysroot};
 use anyhow::{Context, Result, bail};

@@ -10,18 +10,11 @@
 
 #[cfg(feature = "example")]
 pub mod example;
-mod line;
-#[cfg(not(feature = "decode"))]
-#[path = "no_strings.rs"]
-mod strings;
-#[cfg(feature = "decode")]
-mod strings;
 mod table;
 
 use object::Object;
 
-pub use line::Line;
-pub use table::{Table, TableError};
+pub use table::{Line, Table, TableError};
 
 /// The folder for tables filled by `cargo xtask firmware`, inside cargo's target directory.
 pub const FOLDER: &str = "log-tables";

@@ -1,9 +1,18 @@
-//! The string table of one image, and decoding of bytes into lines.
+//! The string table of one image, decoding of bytes into lines, and a decoded line.
 
 use std::path::{Path, PathBuf};
 
-use crate::line::Line;
-use crate::strings::Strings;
+use log::Level;
+use strings::Strings;
+
+/// One line of a controller's log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// Severity; a line without a level counts as information.
+    pub level: Level,
+    /// The device's time in seconds, if the image contains it, followed by the text.
+    pub text: String,
+}
 
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]
@@ -68,5 +77,65 @@ impl Table {
             }
         }
         lost
+    }
+}
+
+/// The decoder, based on defmt's.
+#[cfg(feature = "decode")]
+mod strings {
+    use super::Line;
+    use log::Level;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    /// The strings of one image.
+    pub struct Strings(defmt_decoder::Table);
+
+    impl Strings {
+        pub fn of_image(image: &[u8]) -> Result<Self, String> {
+            let table = defmt_decoder::Table::parse(image).map_err(|error| error.to_string())?;
+            let table = table.ok_or("it logs nothing")?;
+            // for such a slice, defmt's decoder reserves as many elements as a four-byte count
+            // specifies, even in damaged data
+            if let Some(symbol) = table.raw_symbols().find(|symbol| symbol.contains("=[?]")) {
+                return Err(format!(
+                    "it logs slices of values, which damaged bytes would make endless: {symbol}"
+                ));
+            }
+            Ok(Self(table))
+        }
+
+        /// Decodes one line; the bytes include the terminating zero.
+        pub fn line(&self, encoded: &[u8]) -> Option<Line> {
+            // a panic of the third-party decoder on damaged bytes must not end a campaign
+            let decoded = catch_unwind(AssertUnwindSafe(|| {
+                let mut decoder = self.0.new_stream_decoder();
+                decoder.received(encoded);
+                let frame = decoder.decode().ok()?;
+                let at = frame.display_timestamp().map(|at| format!("{at} ")).unwrap_or_default();
+                let level =
+                    frame.level().and_then(|level| level.as_str().parse().ok()).unwrap_or(Level::Info);
+                Some(Line { level, text: format!("{at}{}", frame.display_message()) })
+            }));
+            decoded.ok().flatten()
+        }
+    }
+}
+
+/// Replacement for the decoder when it is disabled.
+#[cfg(not(feature = "decode"))]
+mod strings {
+    use super::Line;
+
+    /// Never constructed.
+    pub enum Strings {}
+
+    impl Strings {
+        pub fn of_image(_image: &[u8]) -> Result<Self, String> {
+            Err("this program was built without the feature `device-logs`, which reads it".into())
+        }
+
+        pub fn line(&self, _encoded: &[u8]) -> Option<Line> {
+            match *self {}
+        }
     }
 }

@@ -15,52 +15,41 @@
 //!
 //! **Cost.** A scan of the assembly at 51.2 kHz takes about 0.1 µs; `benches/rig.rs` measures it.
 
-mod aim;
-mod body;
+use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
+use force::ForceSegment;
+use key::stream;
+use plant::Plant;
+use sensors::FixedSensors;
+use sensors::Sensors;
+use stepper::{ScanForces, Slipping, Span, Stepper};
+
+pub use channels::{CHANNELS, Channel, Measured};
+pub use config::RigConfig;
+pub use configuration::{Configuration, Quantity};
+pub use hammer::{Hit, Mishap};
+pub use plant::Stepping;
+pub use probe::Aim;
+pub use probe::Probe;
+pub use sensors::Flaws;
+pub use sensors::{FixedFlaw, FixedRows};
+pub use structure::exact_frf;
+pub use truth::JointState;
+pub use truth::Truth;
+
 pub(crate) mod channels;
-mod code;
 pub mod config;
 mod configuration;
-mod delay_line;
-mod error;
-mod fixed;
-mod flaws;
 pub mod force;
 pub mod hammer;
-mod joint_state;
 mod key;
 pub mod modal;
 mod plant;
 mod probe;
 pub mod sensors;
 pub mod sliders;
-pub mod state_space;
 pub mod stepper;
 pub mod structure;
 mod truth;
-mod unit_vector;
-
-pub use aim::Aim;
-pub use channels::{CHANNELS, Channel, Measured};
-pub use config::RigConfig;
-pub use configuration::{Configuration, Quantity};
-pub use error::RigError;
-pub use fixed::{FixedFlaw, FixedRows};
-pub use flaws::Flaws;
-pub use hammer::{Hit, Mishap};
-pub use joint_state::JointState;
-pub use probe::Probe;
-pub use structure::exact_frf;
-pub use truth::Truth;
-
-use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
-use fixed::FixedSensors;
-use force::ForceSegment;
-use key::stream;
-use plant::Plant;
-pub use plant::Stepping;
-use sensors::Sensors;
-use stepper::{ScanForces, Slipping, Span, Stepper};
 
 /// One rig.
 #[derive(Debug, Clone)]
@@ -116,7 +105,7 @@ impl Rig {
         let flaws = Flaws::new(seed, config, &ten);
         let sensors = Sensors::new(config, &ten, &flaws, None, stream(seed, &["at rest"]));
         let fixed = FixedSensors::new(config, &flaws.fixed, flaws.latency_scans, stream(seed, &["at rest"]));
-        let channels: Vec<Channel> = ten.into_iter().chain(fixed::channels(config)).collect();
+        let channels: Vec<Channel> = ten.into_iter().chain(sensors::fixed_channels(config)).collect();
         let configuration = Configuration::Ajb;
         // check() has verified that there is at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
@@ -386,4 +375,65 @@ impl Rig {
     pub fn fallback(&self) -> Option<modal::ModalError> {
         self.plants[self.configuration as usize].fallback()
     }
+}
+
+/// What went wrong, where, and what to do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RigError {
+    /// The rig file cannot be parsed.
+    #[error("rig file{}: {reason}", line.map(|line| format!(", line {line}")).unwrap_or_default())]
+    Document {
+        /// Line of the file, from 1.
+        line: Option<usize>,
+        /// The reason, in words.
+        reason: String,
+    },
+    /// A field has an invalid value.
+    #[error("rig field {field}{} {reason}", line.map(|line| format!(" (line {line})")).unwrap_or_default())]
+    Field {
+        /// Path of the field.
+        field: String,
+        /// Why it is invalid.
+        reason: String,
+        /// Line of the rig file, from 1, where the file sets it.
+        line: Option<usize>,
+    },
+    /// No such impact or response point in this configuration.
+    #[error("no {kind} point {name:?} in configuration {configuration}; there are: {}", valid.join(", "))]
+    UnknownPoint {
+        /// `impact` or `response`.
+        kind: &'static str,
+        /// The requested name.
+        name: String,
+        /// The configuration on the rig.
+        configuration: Configuration,
+        /// The valid names.
+        valid: Vec<String>,
+    },
+    /// The requested point is on a body that this configuration does not have.
+    #[error("a point sits on {body}, which configuration {configuration} does not have")]
+    MissingBody {
+        /// The body.
+        body: String,
+        /// The configuration.
+        configuration: Configuration,
+    },
+    /// The structure's matrices cannot be factored.
+    #[error("configuration {configuration}: {what}; check masses, inertias and stiffnesses")]
+    Structure {
+        /// The configuration.
+        configuration: Configuration,
+        /// What failed.
+        what: &'static str,
+    },
+}
+
+/// `v` normalised to length one; `v` must not be zero.
+pub(super) fn normalized(v: [f64; 3]) -> [f64; 3] {
+    // Divided by the largest component first, so that the squares of very small or large vectors
+    // neither underflow nor overflow.
+    let largest = v.iter().fold(0.0_f64, |largest, c| largest.max(c.abs()));
+    let v = v.map(|c| c / largest);
+    let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    v.map(|c| c / length)
 }

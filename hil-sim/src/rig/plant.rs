@@ -7,12 +7,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
 use super::config::{BodyName, Contact, ContactLaw, RigConfig};
-use super::fixed::FixedRows;
-use super::flaws::Flaws;
+use super::modal::StateSpace;
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
+use super::sensors::FixedRows;
+use super::sensors::Flaws;
 use super::sliders::Sliders;
-use super::state_space::StateSpace;
 use super::stepper::{Aimed, ExponentialStepper, Joint, ModalStepper, Slipping, Stepper};
 use super::structure::Structure;
 use super::{Aim, Configuration, JointState, RigError};

@@ -1,8 +1,20 @@
-//! A direction at a point of a body, for measurement or excitation.
+//! A direction at a point of a body, for measurement or excitation: nominal, and the true one of
+//! hammer and vibrometer with unknown errors.
+//!
+//! The error of a point belongs to its name and is constant during a campaign: its position, and
+//! for an impact also the tilt at which the hammer's holder meets the surface. Each cell adds an
+//! aiming error, except for points on a specimen: their marks are small, and the laser finds them
+//! again with its own camera. All errors are keyed to (seed, purpose), so the order in which cells
+//! are visited does not matter.
+//!
+//! The tilt belongs to the point because it results from holder and surface, not from the day of
+//! measurement. If it were drawn separately for A and AJB, it would differ between the
+//! configurations, would no longer cancel, and would reduce every decoupled stiffness by about 13
+//! %.
 
-use super::config::{BodyName, ImpactPoint, ResponsePoint, RigConfig, Spot};
-use super::unit_vector::normalized;
-use super::{Configuration, RigError};
+use super::config::{BodyName, Errors, ImpactPoint, ResponsePoint, RigConfig, Spot};
+use super::key::{Stream, normal, stream};
+use super::{Configuration, RigError, normalized};
 
 /// Unit vectors of the axes.
 pub const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -72,4 +84,78 @@ impl RigConfig {
             valid: there().map(|point| point.name.clone()).collect(),
         })
     }
+}
+
+/// True geometry of one cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aim {
+    /// Position and direction of the hammer's impact.
+    pub impact: Probe,
+    /// Where the 3-D vibrometer measures, along x, y and z.
+    pub response: [Probe; 3],
+}
+
+impl Aim {
+    /// Geometry of the cell `words` = (configuration, impact, response).
+    pub fn new(
+        seed: u64,
+        words: [&str; 3],
+        errors: &Errors,
+        impact: &ImpactPoint,
+        response: &ResponsePoint,
+    ) -> Self {
+        let errors = errors.acting();
+        let [configuration, hit, seen] = words;
+        let cell = |purpose| stream(seed, &[configuration, hit, seen, purpose]);
+        let mut impact_aim = cell("impact aim");
+        let mut response_aim = cell("response aim");
+        let mut hit_point = stream(seed, &["impact position", hit]);
+        let mut seen_point = stream(seed, &["response position", seen]);
+        let hit_m = shifted(
+            shifted(impact.position_m, errors.position_m, &mut hit_point),
+            errors.aim_m,
+            &mut impact_aim,
+        );
+        let (seen_sigma_m, aim_m) = if response.body.is_specimen() {
+            (errors.specimen_point_m, 0.0)
+        } else {
+            (errors.position_m, errors.aim_m)
+        };
+        let own_m = response.sigma_m.filter(|_| !errors.none);
+        let seen_sigma_m = own_m.unwrap_or(seen_sigma_m);
+        let seen_m =
+            shifted(shifted(response.position_m, seen_sigma_m, &mut seen_point), aim_m, &mut response_aim);
+        let mut hammer = stream(seed, &["hammer angle", hit]);
+        let direction = tilted(impact.probe().direction, errors.hammer_angle_rad, &mut hammer);
+        Self {
+            impact: Probe { body: impact.body, position_m: hit_m, direction },
+            response: AXES.map(|axis| Probe { body: response.body, position_m: seen_m, direction: axis }),
+        }
+    }
+}
+
+pub(super) fn shifted(position_m: [f64; 3], sigma_m: f64, stream: &mut Stream) -> [f64; 3] {
+    position_m.map(|coordinate| coordinate + sigma_m * normal(stream))
+}
+
+/// `direction` rotated by a random angle about each of two axes normal to it.
+fn tilted(direction: [f64; 3], sigma_rad: f64, stream: &mut Stream) -> [f64; 3] {
+    let (about_first, about_second) = (sigma_rad * normal(stream), sigma_rad * normal(stream));
+    // The axis with the smallest component along the direction gives a well-conditioned first
+    // perpendicular.
+    let least = (0..3).min_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap_or(0);
+    let first = normalized(cross(direction, AXES[least]));
+    let second = cross(direction, first);
+    // A rotation vector normal to the direction rotates it by the vector's length.
+    let angle = about_first.hypot(about_second);
+    if angle == 0.0 {
+        return direction;
+    }
+    let axis: [f64; 3] = std::array::from_fn(|i| (first[i] * about_first + second[i] * about_second) / angle);
+    let across = cross(axis, direction);
+    std::array::from_fn(|i| direction[i] * angle.cos() + across[i] * angle.sin())
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -1,19 +1,25 @@
-//! The sensors: from true signals to converter codes.
+//! The sensors and their errors: from true signals to converter codes.
 //!
 //! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) /
-//! scale. Noise is drawn for every channel in every scan, present or not, so that a channel's
-//! stream does not depend on the others. Cross-talk, gain and skew ([`Flaws`]) are applied before
-//! the noise.
+//! scale. A delay has whole scans and a fraction of one. Noise is drawn for every channel in every
+//! scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain
+//! and skew ([`Flaws`]) are applied before the noise. The errors of a campaign's instruments, also
+//! the true positions of the spots, are keyed to (seed, purpose): the same in every cell and
+//! configuration, whatever was visited before.
+//!
+//! Fixed vibrometers stay at one point while the hammer moves; each has its own channel after the
+//! ten. Their errors are of the same kinds as those of the other vibrometers: true position (keyed
+//! to the response point as for the 3-D vibrometer, but without the aiming error), gain, skew and
+//! noise. Their noise has a separate stream, so that they do not change the ten channels.
 
-use super::channels::{CHANNELS, Channel, LOAD_CELLS, VIBROMETER};
-use super::code::code;
-use super::config;
-use super::config::{Hammer, RigConfig};
-use super::delay_line::DelayLine;
-use super::flaws::Flaws;
+use super::channels::{CHANNELS, Channel, FORCE, LOAD_CELLS, Measured, VIBROMETER, is_gauged};
+use super::config::{FixedVibrometer, Hammer, RigConfig, Spot, Spots};
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
-use super::key::{Stream, normal, uniform};
+use super::key::{Stream, normal, stream, uniform};
+use super::probe::{Probe, shifted};
+use super::{config, normalized};
+use nalgebra::DVector;
 use num_complex::Complex;
 use std::f64::consts::PI;
 
@@ -210,4 +216,246 @@ impl Speckle {
         }
         if self.lost { (0.0, self.dropout_floor_factor) } else { (1.0, self.floor_factor) }
     }
+}
+
+/// Delays a signal: cubic interpolation through the four samples around the delayed time.
+#[derive(Debug, Clone)]
+pub(super) struct DelayLine {
+    past: Vec<f64>,
+    at: usize,
+    /// Age of the newest of the four samples used, in scans, and the four weights.
+    first: usize,
+    weights: [f64; 4],
+}
+
+impl DelayLine {
+    pub(super) fn new(delay_scans: f64) -> Self {
+        // The cubic is most accurate in its middle interval; a delay below one scan has no newer
+        // sample than the present one.
+        let first = (delay_scans.floor() as usize).saturating_sub(1);
+        let d = delay_scans - first as f64;
+        let mut weights = [1.0; 4];
+        for (i, weight) in weights.iter_mut().enumerate() {
+            for j in (0..4).filter(|j| *j != i) {
+                *weight *= (d - j as f64) / (i as f64 - j as f64);
+            }
+        }
+        // A power of two, so that the index wraps with a mask instead of a division.
+        Self { past: vec![0.0; (first + 4).next_power_of_two()], at: 0, first, weights }
+    }
+
+    #[inline]
+    pub(super) fn pass(&mut self, value: f64) -> f64 {
+        let mask = self.past.len() - 1;
+        self.past[self.at & mask] = value;
+        let newest = self.at.wrapping_sub(self.first);
+        let late = (0..4).map(|i| self.weights[i] * self.past[newest.wrapping_sub(i) & mask]).sum();
+        self.at = self.at.wrapping_add(1);
+        late
+    }
+}
+
+/// Rounded to the nearest code, saturating.
+#[inline]
+pub(super) fn code(exact: f64) -> i16 {
+    // At 1.5 · 2^52 the last bit of an f64 is one, so the sum rounds and its low bits are the
+    // integer. Unlike a cast, this needs no branch, so the ten channels are vectorised. The
+    // comparisons map NaN to the lower limit.
+    const ONES_PLACE: f64 = 6_755_399_441_055_744.0;
+    let above = if exact > -32768.0 { exact } else { -32768.0 };
+    let within = if above < 32767.0 { above } else { 32767.0 };
+    (within + ONES_PLACE).to_bits() as i16
+}
+
+/// Errors of one fixed vibrometer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FixedFlaw {
+    /// Its true position and direction.
+    pub probe: Probe,
+    /// Ratio of its reading to the true value: 1 without error.
+    pub gain: f64,
+    /// Delay beyond the declared one and the latency (s).
+    pub skew_s: f64,
+}
+
+/// The errors for the rig `seed`, in the order of the configuration. [`RigConfig::check`] has
+/// verified that the points exist.
+fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
+    let errors = config.errors.acting();
+    let one = |own: &FixedVibrometer| {
+        let point = config.responses.iter().find(|point| point.name == own.response)?;
+        let sigma_m = if point.body.is_specimen() { errors.specimen_point_m } else { errors.position_m };
+        let sigma_m = point.sigma_m.filter(|_| !errors.none).unwrap_or(sigma_m);
+        let mut place = stream(seed, &["response position", &point.name]);
+        let draw = |what: &str| normal(&mut stream(seed, &[what, &own.name]));
+        let stated = errors.volts.get(&own.name).copied().unwrap_or(1.0);
+        Some(FixedFlaw {
+            probe: Probe {
+                body: point.body,
+                position_m: shifted(point.position_m, sigma_m, &mut place),
+                direction: normalized(own.direction),
+            },
+            gain: stated * (1.0 + errors.gain * draw("gain")),
+            skew_s: errors.skew_s * draw("skew"),
+        })
+    };
+    config.sensors.fixed.iter().filter_map(one).collect()
+}
+
+/// Their channels, in the order of the configuration.
+pub(super) fn fixed_channels(config: &RigConfig) -> Vec<Channel> {
+    let one = |own: &FixedVibrometer| Channel {
+        name: own.name.clone(),
+        quantity: Measured::Velocity,
+        unit: "m/s",
+        units_per_volt: own.units_per_volt,
+        range_v: config.sensors.range_v,
+        delay_s: own.delay_s,
+        polarity: own.polarity,
+        axis: None,
+    };
+    config.sensors.fixed.iter().map(one).collect()
+}
+
+/// Their output rows, in state coordinates (2n).
+#[derive(Debug, Clone, Default)]
+pub struct FixedRows {
+    /// Row of each; zero where the configuration lacks the body.
+    pub rows: Vec<DVector<f64>>,
+    /// Size of one converter step of each (m/s).
+    pub steps: Vec<f64>,
+}
+
+/// Converts the true signals to codes.
+#[derive(Debug, Clone)]
+pub(super) struct FixedSensors {
+    own: Vec<One>,
+    signals: Vec<f64>,
+    stream: Stream,
+}
+
+#[derive(Debug, Clone)]
+struct One {
+    codes_per_unit: f64,
+    /// Noise (codes rms).
+    noise: f64,
+    delay: Option<DelayLine>,
+}
+
+impl FixedSensors {
+    /// With the cell's idle `stream`; all channels are delayed by `latency_scans`.
+    pub(super) fn new(config: &RigConfig, flaws: &[FixedFlaw], latency_scans: u32, stream: Stream) -> Self {
+        let rate_hz = f64::from(config.scan_rate_hz);
+        let one = |((own, channel), flaw): ((&FixedVibrometer, Channel), &FixedFlaw)| {
+            let late = f64::from(latency_scans) + (own.delay_s + flaw.skew_s) * rate_hz;
+            One {
+                codes_per_unit: flaw.gain * f64::from(own.polarity) / channel.step(),
+                // white up to half the scan rate
+                noise: own.floor * (rate_hz / 2.0).sqrt() / channel.step(),
+                delay: (late > 0.0).then(|| DelayLine::new(late)),
+            }
+        };
+        let own: Vec<One> =
+            config.sensors.fixed.iter().zip(fixed_channels(config)).zip(flaws).map(one).collect();
+        Self { signals: vec![0.0; own.len()], own, stream }
+    }
+
+    /// A hit begins: the noise stream restarts here.
+    pub(super) fn restart(&mut self, stream: Stream) {
+        self.stream = stream;
+    }
+
+    /// Converts one scan: `read` fills in the true signals.
+    pub(super) fn convert(&mut self, read: impl FnOnce(&mut [f64]), codes: &mut [i16]) {
+        read(&mut self.signals);
+        for (at, own) in self.own.iter_mut().enumerate() {
+            let signal = match &mut own.delay {
+                Some(line) => line.pass(self.signals[at]),
+                None => self.signals[at],
+            };
+            let exact = signal * own.codes_per_unit + own.noise * normal(&mut self.stream);
+            if let Some(given) = codes.get_mut(at) {
+                *given = code(exact);
+            }
+        }
+    }
+}
+
+/// Instrument errors of one campaign.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flaws {
+    /// True positions of the single-point vibrometers.
+    pub spots: Spots,
+    /// Ratio of each channel's reading to the true value: 1 without error.
+    pub gains: [f64; CHANNELS],
+    /// Delay of each channel beyond the declared one and the latency below (s); negative if it is
+    /// early.
+    pub skews_s: [f64; CHANNELS],
+    /// Whole scans by which all channels are delayed, so that none precedes its cause.
+    pub latency_scans: u32,
+    /// Errors of the fixed vibrometers.
+    pub fixed: Vec<FixedFlaw>,
+    /// Fraction of the force of each load cell (column) that each other one (row) reads; the
+    /// diagonal is zero.
+    pub cross_talk: [[f64; 3]; 3],
+}
+
+impl Flaws {
+    /// Errors for the rig `seed`.
+    pub(super) fn new(seed: u64, config: &RigConfig, channels: &[Channel; CHANNELS]) -> Self {
+        let errors = config.errors.acting();
+        let draw = |words: &[&str]| normal(&mut stream(seed, words));
+        let gains = std::array::from_fn(|at| {
+            let sigma = match at {
+                FORCE => errors.hammer_gain,
+                _ if is_gauged(at) => errors.gain,
+                _ => 0.0,
+            };
+            let stated = errors.volts.get(&channels[at].name).copied().unwrap_or(1.0);
+            stated * (1.0 + sigma * draw(&["gain", &channels[at].name]))
+        });
+        let skews_s = std::array::from_fn(|at| {
+            if at == FORCE { 0.0 } else { errors.skew_s * draw(&["skew", &channels[at].name]) }
+        });
+        let fixed = fixed_flaws(seed, config);
+        let name = |cell: usize| channels[LOAD_CELLS[cell]].name.as_str();
+        let cross_talk = std::array::from_fn(|reads: usize| {
+            std::array::from_fn(|of: usize| {
+                let words = ["cross-talk", name(reads), name(of)];
+                if reads == of { 0.0 } else { errors.load_cell_cross_talk * draw(&words) }
+            })
+        });
+        let spot = |name: &str, nominal: &Spot| Spot {
+            body: nominal.body,
+            position_m: shifted(
+                nominal.position_m,
+                errors.spot_m,
+                &mut stream(seed, &["spot position", name]),
+            ),
+        };
+        Self {
+            spots: Spots {
+                ldv_a: spot("ldv_a", &config.spots.ldv_a),
+                ldv_b: spot("ldv_b", &config.spots.ldv_b),
+            },
+            gains,
+            skews_s,
+            latency_scans: latency_scans(
+                skews_s.iter().copied().chain(fixed.iter().map(|own| own.skew_s)),
+                f64::from(config.scan_rate_hz),
+            ),
+            fixed,
+            cross_talk,
+        }
+    }
+}
+
+/// One scan more than the earliest channel is early, so that the interpolating cubic has a sample
+/// on either side; 0 if no channel is skewed.
+fn latency_scans(mut skews_s: impl Iterator<Item = f64> + Clone, rate_hz: f64) -> u32 {
+    if skews_s.clone().all(|skew| skew == 0.0) {
+        return 0;
+    }
+    let earliest = skews_s.by_ref().fold(0.0_f64, f64::min);
+    1 + (-earliest * rate_hz).ceil() as u32
 }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
 use num_complex::Complex;
 
 use super::config::{BodyName, Bushing, OwnStructure, RigConfig, RigidBody};
-use super::unit_vector::normalized;
+use super::normalized;
 use super::{Configuration, Probe, Quantity, RigError};
 
 /// M, C and K of one configuration, SI, in the bodies' own coordinates (m and rad).

@@ -7,8 +7,8 @@ use crate::reference;
 use std::f64::consts::PI;
 
 use jointrig_hil_sim::rig::config::BodyName;
+use jointrig_hil_sim::rig::modal::StateSpace;
 use jointrig_hil_sim::rig::modal::modes;
-use jointrig_hil_sim::rig::state_space::StateSpace;
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Configuration, Probe, Quantity, RigConfig, exact_frf};
 use num_complex::Complex;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use jointrig_hil_sim::rig::config::BodyName;
 use jointrig_hil_sim::rig::force::ForceSegment;
+use jointrig_hil_sim::rig::modal::StateSpace;
 use jointrig_hil_sim::rig::modal::modes;
-use jointrig_hil_sim::rig::state_space::StateSpace;
 use jointrig_hil_sim::rig::stepper::{Aimed, ModalStepper, ScanForces, Span};
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{Configuration, FixedRows, Probe, RigConfig};

@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 
 use jointrig_hil_sim::rig::config::BodyName;
 use jointrig_hil_sim::rig::force::ForceSegment;
+use jointrig_hil_sim::rig::modal::StateSpace;
 use jointrig_hil_sim::rig::modal::{ModalError, modes};
-use jointrig_hil_sim::rig::state_space::StateSpace;
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{CHANNELS, Configuration, Probe, Quantity, Rig, RigConfig, Stepping, exact_frf};
 use num_complex::Complex;

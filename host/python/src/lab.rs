@@ -1,21 +1,23 @@
-//! A campaign file.
+//! A campaign file, and the results of its analysis: the document of `results.json`, its report and
+//! its figures.
 
-use std::path::PathBuf;
-
-use jointrig::analyse::{self, AnalyseError, CampaignFile, KnownContact, Wanted};
+use crate::frf::Frf;
+use crate::interruptible::Stopped;
+use crate::record::Record;
+use crate::{in_the_process_that_loaded_this, interruptible, raised, values};
+use jointrig::analyse::{AnalyseError, CampaignFile, KnownContact, Wanted};
 use jointrig::campaign::plan::{configuration_named, structure};
 use jointrig::campaign::run::progress;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::error::StoreError;
-use jointrig::report;
+use jointrig::report::words::brief;
+use jointrig::results::Results;
 use jointrig::structure::Structure;
+use jointrig::{analyse, report};
 use pyo3::prelude::*;
-
-use crate::analysis::{Analysis, Of};
-use crate::frf::Frf;
-use crate::interruptible::{self, Stopped};
-use crate::record::Record;
-use crate::{in_the_process_that_loaded_this, raised, values};
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
 
 /// The default band of FRF lines, Hz.
 const BAND_HZ: (f64, f64) = (10.0, 1000.0);
@@ -196,5 +198,92 @@ impl Lab {
         let path = self.path.clone();
         let found = interruptible::run(py, move |stopped| work(&Store::open_read_only(&path)?, stopped))?;
         found.map_err(|error| raised::analysis(py, &self.path, &error))
+    }
+}
+
+/// Results of an analysis.
+#[pyclass(module = "jointrig._native", frozen)]
+pub struct Analysis {
+    found: Results,
+    of: Of,
+    spectra: PyOnceLock<Py<PyDict>>,
+}
+
+/// The source of an analysis.
+pub enum Of {
+    /// A campaign file.
+    Campaign(PathBuf),
+    /// FRFs of A, B and the assembly; empty for a loop.
+    Frfs(Vec<(&'static str, Py<Frf>)>),
+}
+
+impl Analysis {
+    pub fn of(found: Results, of: Of) -> Self {
+        Self { found, of, spectra: PyOnceLock::new() }
+    }
+}
+
+#[pymethods]
+impl Analysis {
+    /// The dict of `results.json`.
+    #[getter]
+    fn results<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.found.to_json().map_err(|error| raised::data(py, &error.to_string()))?;
+        values(py, &text)
+    }
+
+    /// The FRFs used, by name of the configuration, for those that have any. For a campaign they
+    /// are computed once, on first use.
+    #[getter]
+    fn spectra(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
+        let made = self.spectra.get_or_try_init(py, || {
+            let all = PyDict::new(py);
+            match &self.of {
+                Of::Campaign(path) => {
+                    for (name, frf) in Lab::at(path.clone()).frfs(py)? {
+                        all.set_item(name, Bound::new(py, frf)?)?;
+                    }
+                }
+                Of::Frfs(given) => {
+                    for (name, frf) in given {
+                        all.set_item(name, frf.bind(py))?;
+                    }
+                }
+            }
+            Ok::<_, PyErr>(all.unbind())
+        })?;
+        Ok(made.clone_ref(py))
+    }
+
+    /// Names of the figures for which there are data, in the order of the report.
+    #[getter]
+    fn figures(&self) -> Vec<&'static str> {
+        report::all_figures(&self.found).iter().map(|figure| figure.name).collect()
+    }
+
+    /// A figure of the report as SVG text that adapts to a light or dark colour scheme.
+    fn svg(&self, py: Python<'_>, figure: &str) -> PyResult<String> {
+        let all = report::all_figures(&self.found);
+        all.iter().find(|own| own.name == figure).map(report::notebook_figure).ok_or_else(|| {
+            let names: Vec<&str> = all.iter().map(|own| own.name).collect();
+            raised::refused(py, &format!("there is no figure `{figure}`: {}", names.join(", ")))
+        })
+    }
+
+    /// Writes `results.json` and `report.html` into `folder`, which is created if it does not
+    /// exist.
+    fn report(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        py.detach(|| report::write(&self.found, &folder, &[]))
+            .map_err(|error| raised::writing(py, &folder, &error))
+    }
+
+    fn _repr_svg_(&self) -> Option<String> {
+        report::all_figures(&self.found).first().map(report::notebook_figure)
+    }
+
+    fn __repr__(&self) -> String {
+        let source = &self.found.source.file;
+        let of = if source.is_empty() { String::new() } else { format!(" of {source}") };
+        format!("Analysis{of}: {}", brief::headline(&self.found))
     }
 }

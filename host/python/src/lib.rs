@@ -7,9 +7,7 @@
 
 #![allow(clippy::needless_pass_by_value, reason = "Python hands arguments over by value")]
 
-mod analysis;
 mod frf;
-mod identify;
 mod interruptible;
 mod lab;
 mod raised;
@@ -49,9 +47,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<lab::Lab>()?;
     module.add_class::<record::Record>()?;
     module.add_class::<frf::Frf>()?;
-    module.add_class::<analysis::Analysis>()?;
+    module.add_class::<lab::Analysis>()?;
     module.add_function(wrap_pyfunction!(signals::frf, module)?)?;
-    module.add_function(wrap_pyfunction!(identify::identify, module)?)?;
+    module.add_function(wrap_pyfunction!(signals::identify, module)?)?;
     module.add_function(wrap_pyfunction!(signals::hysteresis, module)?)?;
     Ok(())
 }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::analyse::analyse_into;
+use super::campaign::run;
 use super::error::CliError;
-use super::{measure, output};
+use super::output;
 use crate::advice::quoted;
 use crate::analyse::Wanted;
 use crate::campaign::plan;
@@ -56,9 +57,9 @@ impl Demo {
         let mut onlooker = self.page.start(Some(&file), &stop, false)?;
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
-        let device = measure::Device { address: &address, seed: self.seed, log_tables: None };
-        let who = measure::Who { stage: Stage::Device, yes: true, new_structure: false, stop };
-        let summary = measure::measure(store, device, who, &mut onlooker, &again, &mut ByRecord)?;
+        let device = run::Device { address: &address, seed: self.seed, log_tables: None };
+        let who = run::Who { stage: Stage::Device, yes: true, new_structure: false, stop };
+        let summary = run::measure(store, device, who, &mut onlooker, &again, &mut ByRecord)?;
         if summary.interrupted {
             let (file, folder) = (quoted(&file), quoted(folder));
             tell_line!("`jointrig analyse {file} --out {folder}` works on what is there");

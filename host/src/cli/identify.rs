@@ -100,7 +100,7 @@ impl Identify {
         if self.json {
             output::json(&results)?;
         } else {
-            output::lines(words::headline::between_the_arms(&results))?;
+            output::lines(words::brief::between_the_arms(&results))?;
             output::lines(words::summary(&results))?;
             output::lines(self.out.iter().map(|folder| where_to_look(folder)))?;
         }

@@ -10,18 +10,16 @@
 //! Tunes the system's allocator for short-lived signals and matrices.
 
 use crate::untrusted_text::{tell_line, visible};
-#[cfg(feature = "dashboard")]
-use analyse_for_page::AnalyseForPage;
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use error::CliError;
+#[cfg(feature = "dashboard")]
+use serve::AnalyseForPage;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 mod analyse;
-#[cfg(feature = "dashboard")]
-mod analyse_for_page;
 mod campaign;
 mod demo;
 mod error;
@@ -33,7 +31,6 @@ mod hysteresis;
 mod identify;
 mod import;
 mod info;
-mod measure;
 #[cfg(feature = "dashboard")]
 mod open_page;
 mod output;

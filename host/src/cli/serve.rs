@@ -1,11 +1,8 @@
 //! `serve`: the live page of a campaign file, of a device's channels, or of both during a
 //! measurement.
-
-use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
-
-use clap::Args;
+//!
+//! `analyse-for-page` is started by the live page's process to analyse a campaign in a separate
+//! process. It is hidden, since users do not call it.
 
 use super::campaign::run::Run;
 use super::error::CliError;
@@ -18,7 +15,12 @@ use crate::dashboard::Dashboard;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
+use crate::live::forming::analyse_for_another;
 use crate::untrusted_text::tell_line;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 /// Interval between updates of the link's accounting.
 const LINK: Duration = Duration::from_secs(1);
@@ -107,4 +109,21 @@ fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     }
     session.finish()?;
     Ok(())
+}
+
+/// Print the result of an analysis, for the live page; ends when the input is closed.
+#[derive(Debug, Args)]
+pub struct AnalyseForPage {
+    /// The campaign file.
+    file: PathBuf,
+    /// The newest record's id.
+    last: i64,
+}
+
+impl AnalyseForPage {
+    pub(super) fn run(self) -> Result<(), CliError> {
+        analyse_for_another(&self.file, self.last, &mut std::io::stdout().lock()).map_err(|source| {
+            CliError::File { path: self.file, doing: "analysing for the live page", source }
+        })
+    }
 }

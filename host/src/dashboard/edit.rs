@@ -16,8 +16,8 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::sync::oneshot;
 
+use super::Problem;
 use super::Shared;
-use super::problem::Problem;
 use crate::campaign::run::answers::{Answerer, Key, Question};
 use crate::campaign::run::answers::{Edit, EditQueue, NotTaken};
 use crate::campaign::verdict::Verdict;

@@ -1,29 +1,13 @@
 //! The live page: shows a campaign file in the browser during and after the measurement.
 //!
-//! No page arms the hammer or moves the shaker. `server` serves HTTP on the loopback address only,
-//! `guard` rejects unauthorised requests, `routes` answers requests, `edit` passes a page's changes
-//! on, `socket` sends updates, `page` is the content for the browser. All of them use the data of
-//! [`crate::live`] and run on separate threads, so that a stalled page affects only its own
-//! display.
+//! No page arms the hammer or moves the shaker. `serve` serves HTTP on the loopback address only,
+//! on one thread, with limits on everything that a client may send; `guard` rejects unauthorised
+//! requests, `routes` answers requests, `edit` passes a page's changes on, `socket` sends updates,
+//! `page` is the content for the browser, and an error response ([`Problem`]) says what is wrong,
+//! where, and what to do. All of them use the data of [`crate::live`] and run on separate threads,
+//! so that a stalled page affects only its own display.
 
-mod edit;
-mod guard;
-mod page;
-mod problem;
-mod routes;
-mod server;
-mod socket;
-
-use std::io;
-use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
-use std::time::Duration;
-
-use crate::campaign::run::answers::{Answers, answers};
-use crate::campaign::run::answers::{Edits, edits};
+use crate::campaign::run::answers::{Answers, Edits, answers, edits};
 use crate::campaign::store::error::StoreError;
 use crate::device::tap::{Tap, View, tap};
 use crate::live::averaging::Averages;
@@ -34,8 +18,28 @@ use crate::live::frames::Frames;
 use crate::live::message::{Can, Message, Trouble};
 use crate::live::watcher::{WatchQueue, Watcher, watcher};
 use crate::live::watching::Watching;
+use axum::Json;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
 use edit::Controls;
-use guard::Token;
+use guard::{Refusal, Token};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use serde_json::json;
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use tokio::sync::Semaphore;
+
+mod edit;
+mod guard;
+mod page;
+mod routes;
+mod socket;
 
 /// Interval of the checks for changes of the file; a check takes a few microseconds.
 const LOOK: Duration = Duration::from_millis(50);
@@ -203,7 +207,7 @@ impl Dashboard {
         };
         let ended = gone.clone();
         let server = named("page: server", move || {
-            if let Err(error) = server::serve(listener, shared, &ended) {
+            if let Err(error) = serve(listener, shared, &ended) {
                 log::error!("the page is not served any more: {error}");
             }
         })?;
@@ -274,4 +278,99 @@ fn watch(follower: &mut Follower, bus: &Bus, stop: &AtomicBool) {
         }
         std::thread::sleep(LOOK);
     }
+}
+
+/// Why a request could not be answered.
+pub struct Problem {
+    status: StatusCode,
+    what: String,
+    todo: &'static str,
+}
+
+impl Problem {
+    /// A problem with this status.
+    pub fn new(status: StatusCode, what: impl Into<String>, todo: &'static str) -> Self {
+        Self { status, what: what.into(), todo }
+    }
+
+    /// A problem with status 404, not found.
+    pub fn missing(what: &str) -> Self {
+        Self::new(StatusCode::NOT_FOUND, what, "go back to the page")
+    }
+}
+
+impl From<Refusal> for Problem {
+    fn from(refusal: Refusal) -> Self {
+        let [what, todo] = refusal.words();
+        Self::new(refusal.status(), what, todo)
+    }
+}
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        Self::new(StatusCode::NOT_FOUND, error.to_string(), "look at the campaign file")
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body =
+            json!({ "error": { "what": self.what, "where": "the live page's server", "do": self.todo } });
+        (self.status, Json(body)).into_response()
+    }
+}
+
+/// Most simultaneous connections; further ones are closed.
+const CLIENTS: usize = 32;
+/// Largest head of a request, bytes.
+const HEAD: usize = 16 * 1024;
+/// Time limit for a request's head.
+const HEAD_TIME: Duration = Duration::from_secs(5);
+/// Interval of the checks of `stop`.
+const ACCEPT: Duration = Duration::from_millis(100);
+
+/// Serves until `stop`.
+///
+/// # Errors
+/// The listener fails.
+fn serve(listener: TcpListener, shared: Shared, stop: &AtomicBool) -> io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    runtime.block_on(async {
+        listener.set_nonblocking(true)?;
+        let listener = tokio::net::TcpListener::from_std(listener)?;
+        let shared = Arc::new(shared);
+        let router = routes::router(shared.clone());
+        let clients = Arc::new(Semaphore::new(CLIENTS));
+        while !stop.load(Ordering::Relaxed) {
+            shared.end_lease();
+            let Ok(accepted) = tokio::time::timeout(ACCEPT, listener.accept()).await else { continue };
+            let (stream, _) = match accepted {
+                Ok(accepted) => accepted,
+                Err(error) => {
+                    // out of file descriptors, or the client has disconnected: the server continues
+                    log::debug!("a client could not be accepted: {error}");
+                    tokio::time::sleep(ACCEPT).await;
+                    continue;
+                }
+            };
+            let Ok(place) = clients.clone().try_acquire_owned() else {
+                log::debug!("more than {CLIENTS} clients: one is rejected");
+                continue;
+            };
+            let service = TowerToHyperService::new(router.clone());
+            tokio::spawn(async move {
+                let connection = hyper::server::conn::http1::Builder::new()
+                    .timer(TokioTimer::new())
+                    .header_read_timeout(HEAD_TIME)
+                    .max_buf_size(HEAD)
+                    .serve_connection(TokioIo::new(stream), service)
+                    .with_upgrades();
+                if let Err(error) = connection.await {
+                    log::debug!("a client of the page: {error}");
+                }
+                drop(place);
+            });
+        }
+        Ok(())
+    })
 }

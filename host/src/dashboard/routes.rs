@@ -1,7 +1,7 @@
 //! Routes of the server and their handlers.
 
+use super::Problem;
 use super::guard::{Refusal, from_here, token};
-use super::problem::Problem;
 use super::{Shared, edit, page, socket};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;

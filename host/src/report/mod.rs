@@ -17,7 +17,7 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 use std::{fs, io};
-use words::missing_sentences;
+use words::warning_sentences;
 
 pub use document::{compare, document};
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
@@ -219,7 +219,7 @@ pub fn analysed_with_frfs(
     let mut found = analyse(store, Wanted { frfs: true, ..wanted }, progress)?;
     let frfs = std::mem::take(&mut found.frfs);
     let of_records = found.missing.iter().filter(|missing| matches!(missing, Missing::Records { .. }));
-    let told = of_records.map(missing_sentences::sentence).collect();
+    let told = of_records.map(warning_sentences::missing).collect();
     Ok(WithFrfs { results: written(store, found)?, frfs, told })
 }
 

@@ -2,7 +2,7 @@
 //! are binary.
 
 use super::lines::{LONGEST_LINE, Lines, Record, Span, Wrong, is_delimiter};
-use super::{Outside, set58_header, set58_values};
+use super::{Outside, set58_values};
 
 /// One data set's bytes.
 pub(super) struct Block<'a> {
@@ -98,8 +98,8 @@ impl<'a> Iterator for Blocks<'a> {
         let start = lines.offset();
         let body = |end: usize| Span { bytes: &bytes[start..end], offset: start };
         let mut block = Block { number, offset, identifier, body: body(start), binary: None };
-        let closed = if number == 58 && set58_header::is_binary(identifier.bytes) {
-            let header_end = (0..set58_header::LINES).all(|_| lines.next_unless(is_delimiter).is_some());
+        let closed = if number == 58 && set58_values::is_binary(identifier.bytes) {
+            let header_end = (0..set58_values::LINES).all(|_| lines.next_unless(is_delimiter).is_some());
             // where lines end with CR alone, an LF after the header is the first byte of the data
             let before_data = lines.offset();
             if bytes[..start].ends_with(b"\r") && bytes[..before_data].ends_with(b"\r\n") {
@@ -147,7 +147,7 @@ fn before_delimiter(line: &[u8], lines: &Lines<'_>) -> Option<usize> {
     let digits = number.iter().take_while(|b| b.is_ascii_digit()).count();
     let rest = &number[digits..];
     let is_number =
-        (1..=6).contains(&digits) && (rest.trim_ascii().is_empty() || set58_header::is_binary(rest));
+        (1..=6).contains(&digits) && (rest.trim_ascii().is_empty() || set58_values::is_binary(rest));
     is_number.then_some(text.len())
 }
 

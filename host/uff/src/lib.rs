@@ -63,7 +63,6 @@ mod foreign_tests;
 mod function;
 mod lines;
 mod number;
-mod output;
 #[cfg(test)]
 mod round_trip_tests;
 mod set15;
@@ -72,7 +71,6 @@ mod set164;
 mod set2411;
 mod set2412;
 mod set58;
-mod set58_header;
 mod set58_values;
 mod set82;
 
@@ -320,7 +318,7 @@ pub struct WriteError {
 /// hold, or values that do not match their abscissa.
 pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
     let parts = of_each(sets.iter().collect(), |(place, set)| {
-        let mut out = output::Output::default();
+        let mut out = lines::Output::default();
         let written = match set {
             DataSet::Function(function) => set58::write(function, &mut out),
             DataSet::Nodes(nodes) => set15::write(nodes, &mut out),

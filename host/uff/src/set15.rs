@@ -2,7 +2,7 @@
 
 use super::lines::{Lines, Words, Wrong};
 use super::number;
-use super::output::{Output, integers};
+use crate::lines::{Output, integers};
 
 /// A node.
 #[derive(Debug, Clone, Copy, PartialEq)]

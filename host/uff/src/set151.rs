@@ -1,7 +1,7 @@
 //! Data set 151: the file's header. Seven lines of texts, dates and versions.
 
 use super::lines::{Lines, Wrong, integer, unless_none};
-use super::output::{Output, integers, label};
+use crate::lines::{Output, integers, label};
 
 /// The program that wrote the file, and when. Dates and times are stored as written: `21-Nov-26`,
 /// `14:30:00`.

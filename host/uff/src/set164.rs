@@ -2,7 +2,7 @@
 
 use super::lines::{Lines, Words, Wrong, integer, unless_none};
 use super::number;
-use super::output::{Output, integers, label};
+use crate::lines::{Output, integers, label};
 
 /// Units of the file. A value in the file divided by its factor is SI.
 #[derive(Debug, Clone, PartialEq)]

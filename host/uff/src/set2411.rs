@@ -2,8 +2,8 @@
 
 use super::lines::{Lines, Wrong};
 use super::number;
-use super::output::Output;
 use super::set15::{self, Node};
+use crate::lines::Output;
 
 /// Its sequence of numbers is the same as in set 15.
 pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Node>, Wrong> {

@@ -2,7 +2,7 @@
 
 use super::lines::{Lines, Words, Wrong};
 use super::number::count;
-use super::output::{Output, integers};
+use crate::lines::{Output, integers};
 
 /// Descriptors of beams, which have an additional line: rod, linear, tapered, curved and parabolic
 /// beam.

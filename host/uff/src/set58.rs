@@ -4,9 +4,9 @@ use super::blocks::Block;
 use super::function::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values};
 use super::lines::{Lines, Wrong};
 use super::number;
-use super::output::{Output, integers, label};
-use super::set58_header::{self, Dofs};
 use super::set58_values;
+use crate::lines::{Output, integers, label};
+use crate::set58_values::Dofs;
 
 pub(super) fn read(block: &Block<'_>) -> Result<Function, Wrong> {
     let mut lines = Lines::of(block.body);
@@ -14,11 +14,11 @@ pub(super) fn read(block: &Block<'_>) -> Result<Function, Wrong> {
     for (i, line) in id.iter_mut().enumerate() {
         *line = lines.text(&format!("text {}", i + 1))?.label();
     }
-    let dofs = set58_header::dofs(&lines.text("the function's kind and places")?)?;
-    let shape = set58_header::shape(&lines.text("the function's form of data")?)?;
+    let dofs = set58_values::dofs(&lines.text("the function's kind and places")?)?;
+    let shape = set58_values::shape(&lines.text("the function's form of data")?)?;
     let mut axes: [Axis; 4] = Default::default();
     for (axis, what) in axes.iter_mut().zip(["abscissa", "ordinate", "denominator", "z axis"]) {
-        *axis = set58_header::axis(&lines.text(what)?)?;
+        *axis = set58_values::axis(&lines.text(what)?)?;
     }
     let (abscissa, values, encoding) = match block.binary {
         Some(data) => set58_values::read_binary(data, &shape, block.identifier)?,
@@ -64,7 +64,7 @@ pub(super) fn write(f: &Function, out: &mut Output) -> Result<(), String> {
                 &format!(
                     "b{order:>6}{:>6}{:>12}{bytes:>12}{:>6}{:>6}{:>12}{:>12}",
                     2,
-                    set58_header::LINES,
+                    set58_values::LINES,
                     0,
                     0,
                     0,

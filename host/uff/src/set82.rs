@@ -2,7 +2,7 @@
 
 use super::lines::{Lines, Words, Wrong, integer};
 use super::number;
-use super::output::{Output, integers};
+use crate::lines::{Output, integers};
 
 /// A line through nodes.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -9,8 +9,7 @@
 #![allow(clippy::inline_always, reason = "a call in these loops costs more than what is called")]
 
 pub mod cobs;
-pub mod column;
+pub mod codes;
 pub mod crc32;
 pub mod half_band;
 pub mod pair;
-pub mod range;

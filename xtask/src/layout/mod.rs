@@ -4,7 +4,6 @@
 mod crates;
 mod cycles;
 mod equations;
-mod layers;
 mod modules;
 pub mod pages;
 mod policy;
@@ -18,7 +17,7 @@ type Rule = (&'static str, fn(&Project) -> Result<String>);
 const RULES: [Rule; 6] = [
     ("which crate uses which", crates::check),
     ("import cycles of files", cycles::check),
-    ("layers of the host", layers::check),
+    ("layers of the host", crates::check_layers),
     ("equations", equations::check),
     ("licences, bans, sources", policy::check),
     ("pages", pages::check),

@@ -3,7 +3,7 @@
 //!
 //! Where a wired board uses its peripherals, this one uses memory shared with the simulator, in
 //! turns ([`jointrig_firmware::lockstep`]): converters, coil, inputs, stage and link are the parts
-//! in [`parts`], and [`port`] takes the turns. Time is set by the simulator ([`time`]), so the
+//! in [`device`], and [`port`] takes the turns. Time is set by the simulator ([`time`]), so the
 //! speed of the PC has no effect.
 //!
 //! The crate builds two images. `mps2-an505` contains only the board; `mps2-checks` contains checks
@@ -13,9 +13,7 @@
 pub mod device;
 mod executor;
 mod fault;
-pub mod lines;
 pub mod memory;
-mod parts;
 pub mod port;
 mod time;
 pub mod uart;

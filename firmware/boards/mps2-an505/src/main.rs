@@ -3,7 +3,7 @@
 #![no_std]
 #![no_main]
 
-use mps2_an505::{device, lines, memory, port, uart};
+use mps2_an505::{device, memory, port, uart};
 use semihosting::experimental::env::args;
 use semihosting::{eprintln, process};
 
@@ -24,6 +24,6 @@ fn main() -> ! {
         eprintln!("nobody serves this board's front end: use the device address qemu:, which starts both");
         process::exit(2)
     }
-    lines::start();
+    port::start_log();
     device::run(&port::set_up())
 }

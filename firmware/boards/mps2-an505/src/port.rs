@@ -1,16 +1,21 @@
-//! Taking turns with the server of this board; holds the last messages of both sides.
+//! Taking turns with the server of this board; holds the last messages of both sides, and the log
+//! lines for the simulator.
+//!
+//! The lines are encoded, in a ring of the shared memory; one that does not fit is dropped as a
+//! whole. The simulator receives them at the next turn, independently of the link, including lines
+//! from before a host connects and before a panic.
 
+use crate::memory;
 use core::cell::{Cell, RefCell};
-
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::waitqueue::WakerRegistration;
-use jointrig_firmware::lockstep::{Ask, Op, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text};
+use jointrig_firmware::lockstep::{
+    Ask, LOG_AT, Op, RING_BYTES, Reply, Setup, TEXT_AT, TEXT_BYTES, from_text,
+};
 use jointrig_protocol::schema;
 use semihosting::io::{Read, Stdin, Stdout, Write, stdin, stdout};
 use semihosting::{eprintln, process};
-
-use crate::memory;
 
 /// The board's side of the port.
 pub struct Port {
@@ -127,4 +132,20 @@ pub fn set_up() -> Setup {
     }
     eprintln!("the simulator's set-up cannot be read: image and simulator are of different sources");
     process::exit(2)
+}
+
+/// Sends log lines to the simulator from now on.
+pub fn start_log() {
+    jointrig_board_log::also_to(put);
+}
+
+fn put(line: &[u8]) {
+    with(|port| {
+        let head = port.ask.log_head;
+        let room = RING_BYTES - head.wrapping_sub(port.reply.log_tail);
+        if line.len() <= room as usize {
+            memory::write_ring(LOG_AT, head, line);
+            port.ask.log_head = head.wrapping_add(line.len() as u32);
+        }
+    });
 }

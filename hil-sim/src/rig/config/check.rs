@@ -1,12 +1,9 @@
-//! Checks of the values of a rig.
-//!
-//! Checks of the fixed vibrometers.
+//! Checks of the values of a rig, its fixed vibrometers and a user-defined structure (unknown
+//! names, springs that join nothing); each error names the field.
 
-use super::check_structure::check_structure;
-use super::values::{axes, bad, body, bushing, finite, fraction, not_negative, positive, range};
-use super::{ContactLaw, RigConfig};
+use super::{BodyName, Bushing, ContactLaw, OwnBody, OwnStructure, RigConfig, RigidBody, Side};
+use crate::rig::RigError;
 use crate::rig::channels::{CHANNELS, channels};
-use crate::rig::error::RigError;
 use jointrig_protocol::limits::MAX_CHANNELS;
 
 /// Maximum number of steps of a scan in slip.
@@ -329,4 +326,158 @@ pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
         }
     }
     Ok(())
+}
+
+pub(super) fn body(field: &str, body: &RigidBody) -> Result<(), RigError> {
+    positive(&format!("{field}.mass_kg"), body.mass_kg)?;
+    finite(&format!("{field}.cg_m"), &body.cg_m)?;
+    match (body.inertia_kg_m2, body.box_m) {
+        (Some(_), Some(_)) => Err(bad(field, "has both box_m and inertia_kg_m2: give one of them")),
+        (Some(inertia), None) => {
+            inertia.iter().try_for_each(|value| positive(&format!("{field}.inertia_kg_m2"), *value))
+        }
+        (None, Some(edges)) => edges.iter().try_for_each(|value| positive(&format!("{field}.box_m"), *value)),
+        (None, None) => Err(bad(field, "needs box_m or inertia_kg_m2 to have an inertia")),
+    }
+}
+
+pub(super) fn bushing(field: &str, bushing: &Bushing) -> Result<(), RigError> {
+    finite(&format!("{field}.position_m"), &bushing.position_m)?;
+    let groups = [
+        ("stiffness_n_per_m", &bushing.stiffness_n_per_m[..]),
+        ("rotation_nm_per_rad", &bushing.rotation_nm_per_rad[..]),
+        ("damping_s", &bushing.damping_s[..]),
+    ];
+    for (name, values) in groups {
+        for value in values {
+            not_negative(&format!("{field}.{name}"), *value)?;
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn axes(field: &str, axes: Option<[[f64; 3]; 3]>) -> Result<(), RigError> {
+    let Some([x, y, z]) = axes else { return Ok(()) };
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let off = [dot(x, x) - 1.0, dot(y, y) - 1.0, dot(z, z) - 1.0, dot(x, y), dot(y, z), dot(z, x)];
+    // users write about four digits
+    if off.iter().all(|off| off.abs() < 1e-3) {
+        return Ok(());
+    }
+    Err(bad(
+        field,
+        "must be three unit vectors at right angles: x, y and z of this spring in the rig's coordinates",
+    ))
+}
+
+pub(super) fn bad(field: &str, reason: &str) -> RigError {
+    RigError::Field { field: field.to_owned(), reason: reason.to_owned(), line: None }
+}
+
+pub(super) fn finite(field: &str, values: &[f64]) -> Result<(), RigError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(bad(field, &format!("must be finite, not {value}"))),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn positive(field: &str, value: f64) -> Result<(), RigError> {
+    finite(field, &[value])?;
+    if value > 0.0 { Ok(()) } else { Err(bad(field, &format!("must be greater than zero, not {value}"))) }
+}
+
+pub(super) fn not_negative(field: &str, value: f64) -> Result<(), RigError> {
+    finite(field, &[value])?;
+    if value >= 0.0 { Ok(()) } else { Err(bad(field, &format!("must not be negative, but is {value}"))) }
+}
+
+pub(super) fn fraction(field: &str, value: f64) -> Result<(), RigError> {
+    not_negative(field, value)?;
+    if value <= 1.0 { Ok(()) } else { Err(bad(field, &format!("must be between 0 and 1, not {value}"))) }
+}
+
+pub(super) fn range(field: &str, [low, high]: [f64; 2]) -> Result<(), RigError> {
+    not_negative(field, low)?;
+    not_negative(field, high)?;
+    if low <= high { Ok(()) } else { Err(bad(field, &format!("must be [low, high], not [{low}, {high}]"))) }
+}
+
+/// Checks a user-defined structure, and that every point is on one of its bodies.
+pub(super) fn check_structure(config: &RigConfig, own: &OwnStructure) -> Result<(), RigError> {
+    bodies_and_springs(own)?;
+    points_exist(config, own)
+}
+
+fn bodies_and_springs(own: &OwnStructure) -> Result<(), RigError> {
+    for (index, it) in own.bodies.iter().enumerate() {
+        let field = format!("structure.bodies[{index}]");
+        if it.name.as_str() == "ground" {
+            return Err(bad(
+                &format!("{field}.name"),
+                "is ground, the reserved name of the fixed end of a spring",
+            ));
+        }
+        if own.bodies[..index].iter().any(|earlier| earlier.name == it.name) {
+            return Err(bad(
+                &format!("{field}.name"),
+                &format!("{:?} is already a body; names must differ", it.name.as_str()),
+            ));
+        }
+        body(&field, &it.rigid())?;
+    }
+    for (index, it) in own.springs.iter().enumerate() {
+        let field = format!("structure.springs[{index}]");
+        bushing(&field, &it.bushing())?;
+        axes(&format!("{field}.axes"), it.axes)?;
+        let ends = it.ends();
+        for end in ends.into_iter().flatten() {
+            known(own, &format!("{field}.between"), end)?;
+        }
+        if ends[0] == ends[1] {
+            return Err(bad(
+                &format!("{field}.between"),
+                "has one body twice: name two, or `ground` and one",
+            ));
+        }
+        if it.present.is_empty() {
+            return Err(bad(&format!("{field}.in"), "is empty: name A, B or AJB, or leave it out for all"));
+        }
+    }
+    for (field, pair) in [("structure.joint", own.joint), ("structure.arms", own.arms)] {
+        for (name, side) in pair.into_iter().zip([Side::A, Side::B]) {
+            if known(own, field, name)?.of != side {
+                return Err(bad(
+                    field,
+                    &format!(
+                        "has {name} for {side:?}, to which it does not belong: first A's body, then B's"
+                    ),
+                ));
+            }
+        }
+    }
+    if let Some(held) = own.load_cells_on {
+        known(own, "structure.load_cells_on", held)?;
+    }
+    Ok(())
+}
+
+/// Checks that all measured or excited points are on existing bodies.
+fn points_exist(config: &RigConfig, own: &OwnStructure) -> Result<(), RigError> {
+    for (index, point) in config.responses.iter().enumerate() {
+        known(own, &format!("responses[{index}].body"), point.body)?;
+    }
+    for (index, point) in config.impacts.iter().enumerate() {
+        known(own, &format!("impacts[{index}].body"), point.body)?;
+    }
+    known(own, "spots.ldv_a.body", config.spots.ldv_a.body)?;
+    known(own, "spots.ldv_b.body", config.spots.ldv_b.body)?;
+    known(own, "shaker.body", config.shaker.body)?;
+    Ok(())
+}
+
+fn known<'o>(own: &'o OwnStructure, field: &str, name: BodyName) -> Result<&'o OwnBody, RigError> {
+    own.body(name).ok_or_else(|| {
+        let names: Vec<&str> = own.bodies.iter().map(|body| body.name.as_str()).collect();
+        bad(field, &format!("names {name}, which is not a body of [structure]: {}", names.join(", ")))
+    })
 }

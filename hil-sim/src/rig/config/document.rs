@@ -5,7 +5,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{DEFAULT_TOML, RigConfig};
-use crate::rig::error::RigError;
+use crate::rig::RigError;
 
 /// Fields that a user-defined structure replaces.
 pub(super) const PAPERS_OWN: [&str; 8] =

@@ -1,33 +1,20 @@
-//! The parameters of a rig: the contents of a rig TOML file.
+//! The parameters of a rig: the contents of a rig TOML file, table by table.
 //!
 //! `rigs/default.toml` is the built-in default and defines every default value;
 //! [`RigConfig::default`] reads the embedded copy. A user's file states any subset: its tables
 //! merge into the default's, its lists replace the default's lists.
 
-mod check;
-mod check_structure;
-mod contact;
-mod document;
-mod errors;
-mod own_structure;
-mod sensors;
-mod surroundings;
-mod values;
-
-pub use super::body::{BodyName, OwnName};
-pub(crate) use check::normal_load;
-pub use contact::{Contact, ContactLaw, Iwan};
-pub use errors::Errors;
-pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
-pub use sensors::{
-    Excitation, FixedVibrometer, ForceSensor, LoadCells, Sensors, SpeckleNoise, SpotVibrometer, Vibrometer,
-};
-pub use surroundings::{Cable, Surroundings};
-
+use super::{Configuration, RigError, normalized};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
-use super::Configuration;
-use super::error::RigError;
+pub use super::configuration::{BodyName, OwnName};
+pub(crate) use check::normal_load;
+pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
+
+mod check;
+mod document;
+mod own_structure;
 
 /// The built-in default rig, as text.
 pub const DEFAULT_TOML: &str = include_str!("../../../rigs/default.toml");
@@ -338,4 +325,343 @@ pub struct Mishaps {
     pub overload: f64,
     /// Ratio of its peak to an undisturbed one.
     pub overload_factor: [f64; 2],
+}
+
+/// The law of the contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ContactLaw {
+    /// Stuck: a bushing, at any amplitude.
+    Linear,
+    /// Along z a slider in series with the spring and dashpot: stuck up to μN, gross slip beyond.
+    Jenkins,
+    /// Along z many such sliders in parallel with different limits: microslip, then gross slip at
+    /// μN.
+    Iwan,
+}
+
+/// Distribution of the limits of an Iwan contact's elements. The stiffness is shared evenly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Iwan {
+    /// Number of elements.
+    pub elements: u32,
+    /// The limits are spread evenly over 1 ± this times their mean.
+    pub spread: f64,
+}
+
+impl Iwan {
+    /// Each element's fraction of μN, the weakest first: the distribution is divided into
+    /// `elements` equal parts, and each value is the mean of one part.
+    pub fn shares(&self) -> Vec<f64> {
+        let count = f64::from(self.elements);
+        let share = |i: u32| (1.0 + self.spread * ((2.0 * f64::from(i) + 1.0) / count - 1.0)) / count;
+        (0..self.elements).map(share).collect()
+    }
+}
+
+/// The joint under test.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Contact {
+    /// The contact law.
+    pub law: ContactLaw,
+    /// Position (m).
+    pub position_m: [f64; 3],
+    /// kx, ky, kz (N/m); kz is the tangential contact stiffness.
+    pub stiffness_n_per_m: [f64; 3],
+    /// krx, kry, krz (N m/rad).
+    pub rotation_nm_per_rad: [f64; 3],
+    /// β (s) of c = β k for x, y, z, rx, ry, rz.
+    pub damping_s: [f64; 6],
+    /// μ: the contact carries at most μN along z. The linear law has no limit.
+    pub friction_coefficient: f64,
+    /// N (N), at the start; [`super::Rig::set_normal_load`] changes it.
+    pub normal_load_n: f64,
+    /// Longest step while something slips (s).
+    pub slip_step_s: f64,
+    /// The distribution of an Iwan contact.
+    pub iwan: Iwan,
+    /// Axes x, y and z of the contact, of which z slides: orthogonal unit vectors; the rig's axes
+    /// if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<[[f64; 3]; 3]>,
+}
+
+impl Contact {
+    /// Each slider's fraction of μN, the weakest first; empty for the linear law. They share the
+    /// stiffness evenly.
+    pub fn shares(&self) -> Vec<f64> {
+        match self.law {
+            ContactLaw::Linear => Vec::new(),
+            ContactLaw::Jenkins => vec![1.0],
+            ContactLaw::Iwan => self.iwan.shares(),
+        }
+    }
+
+    /// Unit vector of the sliding direction.
+    pub fn sliding(&self) -> [f64; 3] {
+        self.axes.map_or([0.0, 0.0, 1.0], |axes| normalized(axes[2]))
+    }
+
+    /// The stuck contact's spring and dashpot.
+    pub fn bushing(&self) -> Bushing {
+        Bushing {
+            position_m: self.position_m,
+            stiffness_n_per_m: self.stiffness_n_per_m,
+            rotation_nm_per_rad: self.rotation_nm_per_rad,
+            damping_s: self.damping_s,
+        }
+    }
+}
+
+/// Standard deviations of errors that are drawn from the rig's seed; the last three are not drawn
+/// but given directly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Errors {
+    /// Switches off all errors, whatever the other fields are.
+    pub none: bool,
+    /// Each response and impact point that is not on a specimen, along each axis (m), the same in
+    /// every cell.
+    pub position_m: f64,
+    /// Aiming error added to these, drawn again for each cell (m along each axis).
+    pub aim_m: f64,
+    /// Each response point on a specimen, along each axis (m), the same in every cell, without an
+    /// aiming error.
+    pub specimen_point_m: f64,
+    /// Each single-point vibrometer's spot, along each axis (m), the same in every cell.
+    pub spot_m: f64,
+    /// Hammer's tilt about each of the two axes normal to the impact (rad), the same in every cell.
+    pub hammer_angle_rad: f64,
+    /// Relative gain error of each load cell, each single-point vibrometer and each axis of the 3-D
+    /// vibrometer.
+    pub gain: f64,
+    /// Relative gain error of the hammer's force cell.
+    pub hammer_gain: f64,
+    /// Deviation from the declared delay (s), early or late, of every channel except the hammer's.
+    pub skew_s: f64,
+    /// Fraction of each neighbour's force that a load cell reads in addition to its own.
+    pub load_cell_cross_talk: f64,
+    /// a of N (1 + a x / x₀), the normal load of a slipping contact at its relative displacement x.
+    pub normal_load_variation: f64,
+    /// x₀ of that formula (m).
+    pub normal_load_reference_m: f64,
+    /// Ratio of a channel's voltage to the voltage by its scale, by channel name, on top of the
+    /// drawn errors; negative for a reversed sensor.
+    #[serde(default)]
+    pub volts: BTreeMap<String, f64>,
+}
+
+impl Errors {
+    /// The errors that act: all zero if `none` is set.
+    #[must_use]
+    pub fn acting(&self) -> Self {
+        if !self.none {
+            return self.clone();
+        }
+        Self {
+            none: true,
+            position_m: 0.0,
+            aim_m: 0.0,
+            specimen_point_m: 0.0,
+            spot_m: 0.0,
+            hammer_angle_rad: 0.0,
+            gain: 0.0,
+            hammer_gain: 0.0,
+            skew_s: 0.0,
+            load_cell_cross_talk: 0.0,
+            normal_load_variation: 0.0,
+            normal_load_reference_m: self.normal_load_reference_m,
+            volts: BTreeMap::new(),
+        }
+    }
+
+    /// Relative increase of the normal load per metre of relative displacement (1/m).
+    pub fn normal_load_slope_per_m(&self) -> f64 {
+        let acting = self.acting();
+        acting.normal_load_variation / acting.normal_load_reference_m
+    }
+}
+
+/// All sensors. A channel reads volts × `units_per_volt`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensors {
+    /// Converter range, ± this (V).
+    pub range_v: f64,
+    /// The hammer's force cell.
+    pub force: ForceSensor,
+    /// The 3-D vibrometer: x, y, z.
+    pub vibrometer: Vibrometer,
+    /// Single-point vibrometer at specimen A.
+    pub ldv_a: SpotVibrometer,
+    /// Single-point vibrometer at arm B's specimen.
+    pub ldv_b: SpotVibrometer,
+    /// The three load cells.
+    pub load_cells: LoadCells,
+    /// The shaker's force cell.
+    pub excitation: Excitation,
+    /// Vibrometers fixed to one point; none in the default rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixed: Vec<FixedVibrometer>,
+}
+
+/// A vibrometer fixed to a response point: one channel along one direction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FixedVibrometer {
+    /// Its channel's name.
+    pub name: String,
+    /// The response point at which it measures.
+    pub response: String,
+    /// Measured direction (any length; the sign counts).
+    pub direction: [f64; 3],
+    /// m/s per V.
+    pub units_per_volt: f64,
+    /// White noise floor ((m/s)/√Hz) up to half the scan rate.
+    pub floor: f64,
+    /// Delay of the signal (s).
+    #[serde(default)]
+    pub delay_s: f64,
+    /// 1 or −1.
+    #[serde(default = "upright")]
+    pub polarity: i8,
+}
+
+fn upright() -> i8 {
+    1
+}
+
+/// The hammer's force cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ForceSensor {
+    /// N per V.
+    pub units_per_volt: f64,
+    /// Noise (N rms).
+    pub noise_n: f64,
+    /// Delay of the signal (s).
+    pub delay_s: f64,
+    /// 1 or −1.
+    pub polarity: i8,
+    /// Amplitude of the ringing that a hit of nominal duration excites, relative to the hit's peak.
+    pub ring_fraction: f64,
+    /// The ringing's frequency (Hz).
+    pub ring_hz: f64,
+    /// The ringing's decay time (s).
+    pub ring_decay_s: f64,
+}
+
+/// The 3-D vibrometer; arrays are x, y, z.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vibrometer {
+    /// m/s per V.
+    pub units_per_volt: f64,
+    /// White noise floor ((m/s)/√Hz) up to half the scan rate.
+    pub floor: f64,
+    /// Delay of each axis (s).
+    pub delay_s: [f64; 3],
+    /// 1 or −1.
+    pub polarity: [i8; 3],
+    /// Additional noise of a speckled point.
+    pub speckle: SpeckleNoise,
+}
+
+/// Noise of a speckled response point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpeckleNoise {
+    /// Factor by which the floor is higher.
+    pub floor_factor: f64,
+    /// Mean rate at which dropouts begin (1/s).
+    pub dropouts_per_s: f64,
+    /// Their mean duration (s), in which the signal is lost.
+    pub dropout_s: f64,
+    /// Ratio of the floor within a dropout to the ordinary one.
+    pub dropout_floor_factor: f64,
+}
+
+/// A single-point vibrometer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotVibrometer {
+    /// m/s per V.
+    pub units_per_volt: f64,
+    /// White noise floor ((m/s)/√Hz) up to half the scan rate.
+    pub floor: f64,
+    /// Delay of the signal (s).
+    pub delay_s: f64,
+    /// 1 or −1.
+    pub polarity: i8,
+}
+
+/// The three load cells.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadCells {
+    /// N per V.
+    pub units_per_volt: f64,
+    /// Noise of each (N rms).
+    pub noise_n: f64,
+    /// Delay of each (s).
+    pub delay_s: [f64; 3],
+    /// 1 or −1.
+    pub polarity: [i8; 3],
+}
+
+/// The shaker's force cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Excitation {
+    /// N per V.
+    pub units_per_volt: f64,
+    /// Noise (N rms).
+    pub noise_n: f64,
+    /// Delay of the signal (s).
+    pub delay_s: f64,
+    /// 1 or −1.
+    pub polarity: i8,
+}
+
+/// Surroundings of the structure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surroundings {
+    /// Temperature of the specimen at the start (°C).
+    pub temperature_c: f64,
+    /// Rate at which it rises (K/s).
+    pub warming_k_per_s: f64,
+    /// State of the cable of the hammer's force cell.
+    pub force_cable: Cable,
+    /// State of the cable of the shaker's force cell.
+    pub excitation_cable: Cable,
+}
+
+/// What a constant-current supply detects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cable {
+    /// A sensor.
+    Sensor,
+    /// An open circuit.
+    Open,
+    /// A short circuit.
+    Short,
+}
+
+impl Cable {
+    /// Mean voltage at the socket (V): for a sensor the middle of the usual bias range, for an open
+    /// socket the voltage of a 24 V supply behind its current source, for a short the voltage drop
+    /// of the wire.
+    #[must_use]
+    pub fn bias_v(self) -> f32 {
+        match self {
+            Self::Sensor => 11.0,
+            Self::Open => 22.5,
+            Self::Short => 0.1,
+        }
+    }
 }

@@ -8,9 +8,9 @@
 
 use super::driven::REACH_HZ;
 use super::levels::LevelStiffness;
+use super::levels::{Reading, unit};
 use super::outcome::{Interval, Variances, stiffness_of};
 use super::parameters::{COMPLIANCE, Cause};
-use super::reading::{Reading, unit};
 use super::{Known, Stiffness};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;

@@ -1,5 +1,6 @@
 //! k_T from a steady level of the shaker: from force and Δx at the contact instead of T and Δx at
-//! the spots.
+//! the spots. The result is a reading of the contact's compliance, with its uncertainties
+//! ([`Reading`]).
 //!
 //! A level contains T and both spots. It does not contain how arm B and the specimens move per
 //! newton of T at its frequency. That comes from the hits on the moving mass (`driven`), which push
@@ -10,8 +11,7 @@
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
 use super::outcome::Interval;
-use super::parameters::{DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
-use super::reading::{Reading, apart};
+use super::parameters::{COMPLIANCE, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N};
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;
@@ -368,4 +368,38 @@ fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3]) -> C {
             * (p[INERTIA_B] * (z_b - z_arm)
                 + t * (p[INERTIA_B + 1] * (u[4] - u[1]) - p[INERTIA_B + 2] * (u[5] - u[2])));
     (z_a - z_b) / force
+}
+
+/// A level's compliance, its dependence on the parameters of the hits' fit, and its other
+/// uncertainties.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// The level's frequency, Hz.
+    pub frequency_hz: f64,
+    /// 1/k_T, m/N.
+    pub compliance: f64,
+    /// Its derivatives by the parameters.
+    pub row: DVector<f64>,
+    /// Variance of the motions per newton at this frequency.
+    pub turning: f64,
+    /// Variance due to where the shaker pushes.
+    pub place: f64,
+    /// Variance due to the scatter of the level itself.
+    pub level: f64,
+}
+
+/// Difference between a level's compliance and that of the hits, in standard deviations of the
+/// difference.
+pub fn apart(known: &Known, reading: &Reading) -> f64 {
+    let difference = &reading.row - unit(known);
+    let own = reading.turning + reading.place + reading.level;
+    let variance = known.of_sum(&difference).values().sum::<f64>() + own;
+    (reading.compliance - known.p[COMPLIANCE]) / variance.sqrt()
+}
+
+/// The derivatives of the hits' own reading, which is the parameter itself.
+pub fn unit(known: &Known) -> DVector<f64> {
+    let mut unit = DVector::zeros(known.p.len());
+    unit[COMPLIANCE] = 1.0;
+    unit
 }

@@ -19,24 +19,21 @@
 //!
 //! Modules, in order of use:
 //!
-//! - `cell`: the measured signals
-//! - `block`: the cells of an impact
-//! - `parameters`: the unknowns; `form_scale`: the expected size of the form's coefficients
-//! - `model`: the signals as a linear map of the motion; `line`: its elimination; `bins`: sums over
-//!   lines
-//! - `solver`: the most likely parameters; `covariance`: their uncertainty
-//! - `unexplained`: residuals of a cell beyond its noise; `trusted_band`: where the bodies are
-//!   rigid
-//! - `diagnosis`: tests of the assumptions
-//! - `outcome`: the result; `budget`: the sources of its uncertainty
+//! - `block`: the measured signals of each cell, and the cells of an impact
+//! - `parameters`: the unknowns
+//! - `model`: the signals as a linear map of the motion; `line`: its elimination
+//! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell beyond
+//!   its noise
+//! - `diagnosis`: tests of the assumptions, and the band in which the bodies are rigid
+//! - `outcome`: the result and the sources of its uncertainty
 //! - `levels`: k_T of the shaker's levels, given the result of the hits; `driven`: the rotation of
 //!   the bodies there; `joint`: the average of both
 
+use std::f64::consts::TAU;
+
 mod block;
-mod cell;
 mod diagnosis;
 mod driven;
-mod form_scale;
 mod joint;
 mod levels;
 #[cfg(test)]
@@ -45,13 +42,11 @@ mod line;
 mod model;
 mod outcome;
 mod parameters;
-mod reading;
 mod solver;
 #[cfg(test)]
 mod tests;
-mod unexplained;
 
-pub use cell::{ContactCell, SIGMA_PER_S};
+pub use block::{ContactCell, SIGMA_PER_S};
 pub use diagnosis::{Diagnosis, Doubt, Farthest, SignalResidual};
 pub use joint::{Joint, joint};
 pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};
@@ -61,11 +56,11 @@ pub use parameters::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
-use block::{Block, blocks};
+use block::{Block, Group, blocks};
 use diagnosis::trusted;
 use nalgebra::DVector;
 use outcome::{Variances, of_sum};
-use parameters::Parameters;
+use parameters::{FORM, Parameters};
 use solver::Certainty;
 use solver::Solution;
 
@@ -231,10 +226,44 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
             "only {lines} lines of the hits on the assembly have valid values and a known noise in every cell"
         )));
     }
-    form_scale::scale_form(&mut parameters, &blocks);
+    scale_form(&mut parameters, &blocks);
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })
+}
+
+/// Expected stiffness parallel to the load cells, relative to theirs, K = |T/z_B|.
+const BESIDE: f64 = 0.5;
+
+/// Damping over K, s.
+const DAMPING_S: f64 = 3e-5;
+
+/// Arm B's mass resonates on K above this frequency, Hz.
+const LOWEST_HZ: f64 = 250.0;
+
+/// Sets the priors of the form: for z_B these values, for rotations the same times the lever arm of
+/// arm B's points. They keep the form from fitting noise where the hits hardly determine it.
+fn scale_form(parameters: &mut Parameters, blocks: &[Block]) {
+    let mut stiffness: Vec<f64> = Vec::new();
+    let mut lever_m: f64 = 0.0;
+    let start = |at: usize| parameters.all()[at].start;
+    for block in blocks.iter().filter(|b| b.along_z.is_some_and(|at| start(at).abs() > 0.5)) {
+        let place = |channel| block.rows.iter().position(|row| row.cell == 0 && row.channel == channel);
+        if let (Some(t), Some(spot)) = (place(0), place(1)) {
+            stiffness.extend(block.lines.iter().map(|line| (line.value[t] / line.value[spot]).norm()));
+        }
+        for cell in block.cells.iter().filter(|cell| cell.group == Group::ArmB) {
+            lever_m = lever_m.max(start(cell.point).hypot(start(cell.point + 1)));
+        }
+    }
+    stiffness.sort_by(f64::total_cmp);
+    let Some(k) = stiffness.get(stiffness.len() / 2).copied() else { return };
+    let mass = k / (TAU * LOWEST_HZ).powi(2);
+    for (term, sigma) in [BESIDE * k, DAMPING_S * k, mass].into_iter().enumerate() {
+        for (of, lever) in [1.0, lever_m, lever_m].into_iter().enumerate() {
+            parameters.narrow(FORM + 2 + 3 * of + term, sigma * lever);
+        }
+    }
 }
 
 /// Whether a response point is used here.

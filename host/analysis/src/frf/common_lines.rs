@@ -5,7 +5,7 @@
 //! of the same lines may then differ by some millionths of a frequency; such lines count as equal.
 //! FRFs whose bands overlap partly share the lines of the overlap.
 
-use super::matrix::Frf;
+use super::Frf;
 use crate::structure::{Abc, Structure};
 
 /// Frequencies that differ by at most this fraction are the same line: start, step and line are
@@ -105,7 +105,7 @@ pub struct CommonLines {
 /// The structure whose lines do not match those of A, and the first pair that differs (A's line,
 /// then its own). If no line is common to all three, the first lines of B and of the assembly.
 pub fn keep_common_lines(files: &mut [Frf; 3]) -> Result<Option<CommonLines>, (Structure, OtherLines)> {
-    let [a, b, ajb] = files.each_ref().map(super::matrix::Frf::frequency_hz);
+    let [a, b, ajb] = files.each_ref().map(Frf::frequency_hz);
     let with_a = |other: &[f64], structure: Structure| {
         let tolerance = |i: usize, j: usize| PRINTED * a[i].max(other[j]);
         shared(a, other, tolerance).map_err(|apart| (structure, apart))

@@ -3,8 +3,8 @@
 use super::HysteresisError;
 use super::compliance::{ContactCompliance, ImaginaryPeak, SEARCH_HZ};
 use super::dominant_frequency::dominant_frequency;
-use super::finding::LoopFinding;
 use super::impact::{Decay, FIRST_CYCLES, decay};
+use super::loop_analysis::LoopFinding;
 use super::loop_analysis::{Kind, LoopAnalysis};
 use super::loops::{OverCycles, swing};
 use super::record::{HysteresisRecord, Relative};

@@ -9,7 +9,7 @@
 //! Integration of velocity to displacement.
 
 use super::HysteresisError;
-use super::cycle::Cycle;
+use super::loops::Cycle;
 use super::loops::{energy, swing};
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::static_arm::Correction;

@@ -5,7 +5,7 @@
 //! own harmonics are isolated in the spectrum of the whole record.
 
 use super::dominant_frequency::{line_sum, turns};
-use super::finding::LoopFinding;
+use super::loop_analysis::LoopFinding;
 use super::record::{HysteresisRecord, RelativeMotion};
 use crate::parallel::{join, prelude::*};
 use crate::spectra::fft::forward;

@@ -1,7 +1,7 @@
-//! Quantities of one closed loop of T over Δx. Each has its own name, because at 200 Hz near a
-//! hidden resonance the peak secant is 213 N/µm where the least-squares slope is 90 N/µm.
+//! One closed cycle of a record, and the quantities of its loop of T over Δx. Each quantity has its
+//! own name, because at 200 Hz near a hidden resonance the peak secant is 213 N/µm where the
+//! least-squares slope is 90 N/µm.
 
-use super::cycle::Cycle;
 use crate::vectors::dot;
 use num_complex::Complex;
 use serde::Serialize;
@@ -140,6 +140,23 @@ fn harmonic(x: &[f64], order: usize) -> Complex<f64> {
     let n = x.len() as f64;
     let turn = -TAU * order as f64 / n;
     x.iter().enumerate().map(|(i, v)| v * Complex::from_polar(2.0 / n, turn * i as f64)).sum()
+}
+
+/// One closed cycle: M equidistant points of one period.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cycle {
+    /// Relative displacement, mean removed, m.
+    pub displacement_m: Vec<f64>,
+    /// Relative velocity, mean removed, m/s.
+    pub velocity_m_per_s: Vec<f64>,
+    /// Tangential force, mean removed, N.
+    pub force_n: Vec<f64>,
+}
+
+impl Cycle {
+    pub(super) fn signals(&self) -> [&[f64]; 3] {
+        [&self.displacement_m, &self.velocity_m_per_s, &self.force_n]
+    }
 }
 
 #[cfg(test)]

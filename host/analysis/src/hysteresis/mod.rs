@@ -16,10 +16,8 @@
 pub mod analyse;
 pub mod backbone;
 pub mod compliance;
-pub mod cycle;
 pub mod cycles;
 mod dominant_frequency;
-pub mod finding;
 pub mod first_cycle;
 pub mod hammer_slip;
 mod hum;
@@ -36,7 +34,7 @@ mod stick;
 mod timing;
 
 pub use analyse::{analyse, analyse_both, analyse_corrected};
-pub use finding::LoopFinding;
+pub use loop_analysis::LoopFinding;
 pub use loop_analysis::{Kind, LoopAnalysis};
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};

@@ -10,8 +10,8 @@
 //! has both flanks and plateaus, τ and c can be separated from each other and from any law of
 //! friction.
 
-use super::cycle::Cycle;
-use super::finding::LoopFinding;
+use super::loop_analysis::LoopFinding;
+use super::loops::Cycle;
 use nalgebra::{DMatrix, DVector};
 
 /// A shorter delay is not corrected, s: channels are never aligned better than this.

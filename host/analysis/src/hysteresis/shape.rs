@@ -16,8 +16,8 @@
 //! therefore distinguishes microslip from damping at energies where the loop's residual from an
 //! ellipse is still within the nonlinearity of the instruments.
 
-use super::cycle::Cycle;
 use super::cycles::{Harmonics, Scatter};
+use super::loops::Cycle;
 use super::loops::{fundamental_stiffness, harmonics};
 use super::stick::{final_tangent, first_part, slope_over, strokes};
 use num_complex::Complex;

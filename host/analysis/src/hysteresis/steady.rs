@@ -1,12 +1,12 @@
 //! Analyses a shaker record: averages its cycles, and evaluates the average loop and its scatter.
 
 use super::HysteresisError;
-use super::cycle::Cycle;
 use super::cycles::Harmonics;
 use super::cycles::{CycleForce, Steady, Summed};
-use super::finding::LoopFinding;
 use super::hum;
+use super::loop_analysis::LoopFinding;
 use super::loop_analysis::{Kind, LoopAnalysis};
+use super::loops::Cycle;
 use super::loops::{
     OverCycles, closed_swing, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness, swing,
 };

@@ -18,7 +18,7 @@
 //! The flat parts of a loop: the plateaus of gross slip (the friction limit at the middle of the
 //! stroke, and its dependence on position), and play, where the contact moves at constant force.
 
-use super::cycle::Cycle;
+use super::loops::Cycle;
 use super::loops::{slope, swing};
 
 /// A part of the force's swing after a reversal, from the first to the second fraction.

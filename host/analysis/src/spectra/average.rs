@@ -1,15 +1,16 @@
 //! Spectra of many hits, one hit at a time: only the auto- and cross-spectra are accumulated; the
 //! signals of a hit need not be kept.
+//!
+//! The variance of H1 comes from the hits themselves, by leaving out one hit at a time (jackknife).
+//! The coherence formula assumes that the force spectra of all hits have the same shape and that
+//! the hits differ by noise only; the jackknife also includes other variations between hits (aim, a
+//! loosening joint).
 
 use super::SpectraError;
 use super::cross_spectra::{CrossSpectra, OutputSums};
-use super::fft::Order;
-use super::fft::Scratch;
-use super::fft::Windowed;
-use super::fft::{Lines, Put};
-use super::fft::{RecordTransform, check_finite};
-use super::jackknife;
-use crate::parallel::{self, prelude::*};
+use super::fft::{Lines, Order, Put, RecordTransform, Scratch, Windowed, check_finite};
+use crate::parallel;
+use crate::parallel::prelude::*;
 use crate::vectors::wide;
 use bytemuck::{cast_slice, cast_slice_mut};
 use num_complex::Complex;
@@ -310,11 +311,46 @@ impl SpectraAverage {
                     let response: Vec<_> = output.kept.iter().map(|x| x[l]).collect();
                     // |e^(sτ)|², since H is multiplied by e^(sτ)
                     let gain = (2.0 * sigma_per_s * delay_s.get(o).copied().unwrap_or(0.0)).exp();
-                    gain * jackknife::variance_of_part(&force, &response)
+                    gain * variance_of_part(&force, &response)
                 };
                 self.outputs.iter().enumerate().map(of_output).collect()
             })
             .collect();
         self.band.by_line(&variance)
+    }
+}
+
+/// Variance of the real part of H1, which equals that of its imaginary part, at one line: half of
+/// (n − 1)/n Σ |H₍₋ᵢ₎ − H̄|². NaN below two hits.
+pub fn variance_of_part(force: &[Complex<f64>], response: &[Complex<f64>]) -> f64 {
+    let n = force.len().min(response.len());
+    if n < 2 {
+        return f64::NAN;
+    }
+    let s_ff: f64 = force.iter().map(Complex::norm_sqr).sum();
+    let s_xf: Complex<f64> = response.iter().zip(force).map(|(x, f)| x * f.conj()).sum();
+    if s_ff == 0.0 {
+        return f64::INFINITY;
+    }
+    let without: Vec<Complex<f64>> =
+        response.iter().zip(force).map(|(x, f)| (s_xf - x * f.conj()) / (s_ff - f.norm_sqr())).collect();
+    let mean = without.iter().sum::<Complex<f64>>() / n as f64;
+    let scatter: f64 = without.iter().map(|h| (h - mean).norm_sqr()).sum();
+    0.5 * (n as f64 - 1.0) / n as f64 * scatter
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_forces_give_the_variance_of_a_mean() {
+        let force = vec![Complex::new(2.0, 0.0); 4];
+        let h = [1.0, 2.0, 4.0, 9.0];
+        let response: Vec<_> = h.iter().map(|h| Complex::new(2.0 * h, 0.0)).collect();
+        // mean 4, squares 9 + 4 + 0 + 25 = 38; variance of the mean 38 / (3 · 4), half of it for
+        // each part
+        assert!((variance_of_part(&force, &response) - 38.0 / 24.0).abs() < 1e-12);
+        assert!(variance_of_part(&force[..1], &response[..1]).is_nan());
     }
 }

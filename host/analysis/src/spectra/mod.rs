@@ -2,7 +2,7 @@
 //!
 //! [`pulse`] finds the hit, [`window`] cuts and weights, [`average`] accumulates S_ff, S_xf and
 //! S_xx one hit at a time, [`cross_spectra`] stores them and gives FRFs with their scatter by
-//! its estimators and [`jackknife`]. [`estimate`](mod@estimate) performs all of this for a set of
+//! its estimators and the jackknife. [`estimate`](mod@estimate) performs all of this for a set of
 //! records, [`odd_hit`](mod@odd_hit) identifies a hit that disagrees with the others, and
 //! [`usable_band`] finds the band that the hammer excited. Whether a hit is good
 //! is decided elsewhere, from the raw records: the force window hides a second pulse that the
@@ -12,7 +12,6 @@ pub mod average;
 pub mod cross_spectra;
 pub mod estimate;
 pub(crate) mod fft;
-pub mod jackknife;
 pub mod odd_hit;
 pub mod pulse;
 pub mod window;

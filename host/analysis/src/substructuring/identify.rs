@@ -1,13 +1,12 @@
 //! The entry point: from three FRF matrices and the geometry to the joint's stiffness by every
 //! requested method.
 
-use super::back_coupling::BackCoupling;
+use super::coupling::BackCoupling;
 use super::geometry::Geometry;
 use super::idm::IdmSet;
-use super::interface_data::{InterfaceError, Measured};
+use super::interface_data::{InterfaceError, Measured, MeasuredSet};
 use super::joint_over_bands::{JointRow, JointSpectrum};
 use super::line_noise::LineNoise;
-use super::measured_set::MeasuredSet;
 use super::method::Method;
 pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, RefusedReason};

@@ -1,13 +1,14 @@
-//! The rows and columns of the three FRF files that virtual points and internals use, and the
-//! reduced blocks.
+//! The data at the interface: the rows and columns of the three FRF files that virtual points and
+//! internals use, the three measurements with their geometry, and a virtual point in one of them.
 
 use super::geometry::{Configuration, Geometry, Grouping, Point};
 use super::idm::IdmSet;
 use super::product::product_of_block;
-use super::vpt::{self, ROTATION_LENGTH_M, Transformation, VptError};
+use super::vpt;
+use super::vpt::{ROTATION_LENGTH_M, Transformation, VptError, reduce_inputs};
 use crate::frf::{Frf, FrfError, block};
 use crate::structure::Structure;
-use nalgebra::{Complex, DMatrix, Vector3};
+use nalgebra::{Complex, DMatrix, DVector, Vector3};
 
 type Line = DMatrix<Complex<f64>>;
 
@@ -202,4 +203,62 @@ pub(crate) fn scaled(mut z: Line, d: &[f64], factor: Complex<f64>) -> Line {
         column.iter_mut().zip(d).for_each(|(z, left)| *z = *z * factor * left);
     }
     z
+}
+
+/// A substructure.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Side {
+    A,
+    B,
+}
+
+/// The three measurements and the geometry.
+pub(super) struct MeasuredSet<'a> {
+    pub(super) a: Measured<'a>,
+    pub(super) b: Measured<'a>,
+    pub(super) ajb: Measured<'a>,
+    pub(super) geometry: &'a Geometry,
+}
+
+impl<'a> MeasuredSet<'a> {
+    /// The file of one substructure alone.
+    pub(super) fn alone(&self, side: Side) -> Measured<'a> {
+        match side {
+            Side::A => self.a,
+            Side::B => self.b,
+        }
+    }
+}
+
+/// A virtual point in one file with its rotations in metres: T_u and T_f between measured points
+/// and D u, D⁻¹ f.
+pub(super) struct Balanced {
+    pub(super) vp: LocatedVirtualPoint,
+    pub(super) t_u: DMatrix<f64>,
+    pub(super) t_f: DMatrix<f64>,
+}
+
+impl Balanced {
+    pub(super) fn of(
+        file: Measured<'_>,
+        grouping: Grouping,
+        geometry: &Geometry,
+        idms: IdmSet,
+    ) -> Result<Balanced, InterfaceError> {
+        let vp = file.virtual_point(grouping, geometry, idms)?;
+        let d = DMatrix::from_diagonal(&DVector::from_vec(balance(idms)));
+        let (t_u, t_f) = (&d * &vp.responses.t, &vp.impacts.t * &d);
+        Ok(Balanced { vp, t_u, t_f })
+    }
+
+    /// T_u Y T_f of one line, with responses at this virtual point and forces at the other.
+    pub(super) fn admittance(
+        &self,
+        file: Measured<'_>,
+        line: usize,
+        input: &Balanced,
+    ) -> Result<Line, InterfaceError> {
+        let motions = file.reduced_outputs(line, &self.t_u, &self.vp.rows, &input.vp.columns)?;
+        Ok(reduce_inputs(&motions, &input.t_f))
+    }
 }

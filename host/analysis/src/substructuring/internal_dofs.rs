@@ -2,8 +2,7 @@
 //! line by line.
 
 use super::geometry::Grouping;
-use super::interface_data::{Found, InterfaceError};
-use super::measured_set::{Balanced, MeasuredSet, Side};
+use super::interface_data::{Balanced, Found, InterfaceError, MeasuredSet, Side};
 use super::vpt::reduce_inputs;
 use nalgebra::{Complex, DMatrix};
 

@@ -8,7 +8,7 @@
 //! 2. [`geometry`]: positions of the points and their purpose (`Grouping`).
 //! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]:
 //!    any number of virtual points); [`quality`] measures what is lost.
-//! 4. [`decoupling`]: one file per method, all returning Z^J per line; [`pseudo_inverse`] inverts
+//! 4. [`decoupling`]: the methods, all returning Z^J per line; [`pseudo_inverse`] inverts
 //!    without truncating.
 //! 5. [`joint_over_bands`]: K and C per line and over bands, with scatter, interval and warnings.
 //! 6. [`identify`](mod@identify): the entry point for all of the above;
@@ -18,16 +18,16 @@
 //! 8. [`fit`]: K and C by maximum likelihood over all measured blocks;
 //!    [`between_arms`](mod@between_arms): chooses between the two estimates.
 //! 9. [`coupling`]: the inverse problem, from parts to the assembly; [`cmif`](mod@cmif): how many
-//!    modes the interface needs; [`back_coupling`]: whether the identified joint reproduces the
-//!    measured assembly, and [`explained`]: which errors may prevent it; [`quality`] also
-//!    checks passivity and reciprocity; [`semm`](mod@semm): a model corrected by a measurement.
+//!    modes the interface needs; [`BackCoupling`](coupling::BackCoupling): whether the identified
+//!    joint reproduces the measured assembly, and [`explained`]: which errors may prevent it;
+//!    [`quality`] also checks passivity and reciprocity; [`semm`](mod@semm): a model corrected by a
+//!    measurement.
 //!
 //! All FRFs of a campaign must share one exponential window: every method is algebraic in s, so it
 //! is exact on s = σ + iω, but only if A, B and AJB are on the same s. Degrees of freedom are
 //! ordered x, y, z, rx, ry, rz.
 
 pub mod averaged;
-pub mod back_coupling;
 pub mod between_arms;
 pub mod cmif;
 pub mod coupling;
@@ -44,7 +44,6 @@ mod interface_data;
 mod internal_dofs;
 pub mod joint_over_bands;
 pub mod line_noise;
-mod measured_set;
 pub mod method;
 mod product;
 pub mod pseudo_inverse;

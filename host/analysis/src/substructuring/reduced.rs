@@ -1,17 +1,14 @@
 //! One IDM set's virtual points with their admittances, line by line.
 
-use super::back_coupling::BackCoupling;
+use super::coupling::BackCoupling;
 use super::decoupling::{ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock};
 use super::geometry::Grouping;
 use super::idm::IdmSet;
-use super::interface_data::{InterfaceError, balance, scaled};
+use super::interface_data::{Balanced, InterfaceError, MeasuredSet, Side, balance, scaled};
 use super::internal_dofs::Which;
-use super::measured_set::{Balanced, MeasuredSet, Side};
 use super::method::Method;
 use super::pseudo_inverse::full_rank_inverse;
-use super::quality::VirtualPointQuality;
-use super::quality::consistency;
-use super::quality::{passivity, reciprocity};
+use super::quality::{VirtualPointQuality, consistency, passivity, reciprocity};
 use crate::band::Band;
 use crate::parallel::prelude::*;
 use crate::structure::Structure;

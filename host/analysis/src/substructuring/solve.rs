@@ -2,9 +2,8 @@
 
 use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
-use super::interface_data::{balance, scaled};
+use super::interface_data::{MeasuredSet, balance, scaled};
 use super::internal_dofs::Rearrangement;
-use super::measured_set::MeasuredSet;
 use super::method::Method;
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;

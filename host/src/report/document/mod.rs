@@ -4,7 +4,7 @@
 //!
 //! Converts the findings on the interface to the format of the results.
 
-use super::words::{check_sentences, missing_sentences, side_by_side};
+use super::words::{check_sentences, side_by_side, warning_sentences};
 use crate::analyse::Findings;
 use crate::results::{InterfaceModes, MAIN_BAND, Results, Source, VERSION, VirtualPoint, ranges, rounded};
 use crate::substructuring::VirtualPointQuality;
@@ -13,19 +13,17 @@ use serde_json::{Map, json};
 
 pub use compared_from_results::compare;
 
-mod answer_from_findings;
 mod compared_from_results;
-mod joint_from_findings;
-mod loops_from_findings;
+mod from_findings;
 
 /// Builds `results.json` from all findings.
 pub fn document(found: Findings) -> Results {
     let source = source(&found);
     let checks = check_sentences::all(&found);
-    let missing = found.missing.iter().map(missing_sentences::sentence).collect();
-    let answer = answer_from_findings::answer(&found);
-    let (joint, refused) = joint_from_findings::rows(&found);
-    let hysteresis = loops_from_findings::rows(&found);
+    let missing = found.missing.iter().map(warning_sentences::missing).collect();
+    let answer = from_findings::answer(&found);
+    let (joint, refused) = from_findings::joint_rows(&found);
+    let hysteresis = from_findings::loop_rows(&found);
     let mut results = Results {
         version: VERSION,
         source,
@@ -46,11 +44,11 @@ pub fn document(found: Findings) -> Results {
     if let Some(of_frfs) = &found.substructured {
         results.virtual_points = of_frfs.virtual_points.iter().map(quality).collect();
         results.interface_modes = of_frfs.cmif.as_ref().ok().map(interface_modes);
-        results.joint_spectrum = joint_from_findings::spectrum(of_frfs);
+        results.joint_spectrum = from_findings::spectrum(of_frfs);
     }
     for measured in found.configurations {
         if let Some(from) = measured.imported.as_ref().filter(|_| measured.records.is_empty()) {
-            results.missing.push(missing_sentences::imported(measured.configuration, &from.file));
+            results.missing.push(warning_sentences::no_records(measured.configuration, &from.file));
         }
         results.usable_bands.extend(measured.usable_band);
         results.frfs.extend(measured.frfs);

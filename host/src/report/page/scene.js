@@ -1,4 +1,4 @@
-// A scene in space that can be rotated; report/svg/scene.rs draws the same.
+// A scene in space that can be rotated; report/svg/panel.rs draws the same.
 const SVG='http://www.w3.org/2000/svg';
 function node(parent,name,attributes,text){
   const n=document.createElementNS(SVG,name);

@@ -1,10 +1,9 @@
-//! Draws the marks of a panel. `page/marks.js` does the same in the page.
-//!
-//! The marker of a single point.
+//! Draws the marks of a panel at the positions of its values (`page/marks.js` does the same in the
+//! page), and the marker of a single point.
 
 use super::drawing::{Anchor, Area, Drawing, Stroke};
-use super::place::PanelFrame;
 use crate::report::figure::{Along, Bars, Mark, Marker, Packed, Role, Shape};
+use crate::report::scale::Scale;
 
 /// Draws one mark; the caller clips what lies outside the frame.
 pub fn draw(drawing: &mut Drawing, place: &PanelFrame, mark: &Mark) {
@@ -225,4 +224,14 @@ pub fn draw_marker(drawing: &mut Drawing, at: [f64; 2], role: Role, marker: Mark
             }
         }
     }
+}
+
+/// A panel with its frame and axes in pixels.
+pub struct PanelFrame {
+    /// The frame.
+    pub area: Area,
+    /// The horizontal axis.
+    pub x: Scale,
+    /// The vertical axis.
+    pub y: Scale,
 }

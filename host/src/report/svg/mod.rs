@@ -3,8 +3,6 @@
 pub mod drawing;
 mod marks;
 mod panel;
-mod place;
-mod scene;
 
 pub use panel::panel;
 

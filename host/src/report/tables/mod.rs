@@ -9,16 +9,15 @@ use std::fmt::Write;
 
 pub use checks::checks;
 pub use checks::virtual_points;
+pub use joint::recommended;
 pub use joint::{joint, refusals};
 pub use loops::{decay, hysteresis, side_by_side, static_arm};
 pub use provenance::{calibrations, completeness, provenance};
-pub use recommended::recommended;
 
 mod checks;
 mod joint;
 mod loops;
 mod provenance;
-mod recommended;
 
 /// Text for an unknown value.
 pub(super) const UNKNOWN: &str = "–";

@@ -4,9 +4,7 @@
 pub(super) mod answer_sentences;
 pub mod brief;
 pub(super) mod check_sentences;
-pub mod headline;
 pub(super) mod level_sentences;
-pub(super) mod missing_sentences;
 mod names;
 pub mod number;
 pub mod side_by_side;

@@ -7,9 +7,7 @@
 #![no_main]
 
 mod bench;
-mod counter;
 mod script;
-mod stack;
 
 use core::hint::black_box;
 

@@ -1,15 +1,15 @@
-//! The assembly's interface cells over a band: receptances, their noise, and their reduction to two
-//! virtual points.
+//! The assembly's interface cells: their positions, their receptances and noise over a band, and
+//! their reduction to two virtual points.
 
-use super::layout::Layout;
 use super::{AveragedError, Line};
 use crate::band::Band;
 use crate::frf::Frf;
 use crate::structure::Structure;
-use crate::substructuring::geometry::{Geometry, Grouping};
-use crate::substructuring::idm::IdmSet;
-use crate::substructuring::interface_data::{Found, Measured};
-use nalgebra::{Complex, DMatrix};
+use crate::substructuring::geometry::{Geometry, Grouping, Point};
+use crate::substructuring::idm::{Dof, IdmSet};
+use crate::substructuring::interface_data::{Found, LocatedVirtualPoint, Measured, balance};
+use crate::substructuring::vpt::{reduce_inputs, reduce_outputs};
+use nalgebra::{Complex, DMatrix, Vector3};
 
 /// The assembly's FRFs reduced to its two virtual points, with the data needed to relate an error
 /// to its cell.
@@ -71,5 +71,87 @@ fn joined(first: &Found, second: &Found) -> Found {
         names: both(&first.names, &second.names),
         points: first.points.iter().chain(&second.points).cloned().collect(),
         at: first.at.iter().chain(&second.at).copied().collect(),
+    }
+}
+
+/// A channel or impact with the data that the propagation needs.
+pub(super) struct PlacedPoint {
+    pub(super) direction: Vector3<f64>,
+    pub(super) offset: Vector3<f64>,
+    /// 0 for A's virtual point, 1 for B's.
+    pub(super) side: usize,
+    /// Index of the sensor: its axes share one error of position.
+    pub(super) point: usize,
+}
+
+/// The transformations of both virtual points combined, and the places of channels and impacts.
+pub(super) struct Layout {
+    /// 2n_c × channels and impacts × 2n_c, rotations scaled.
+    pub(super) t_u: DMatrix<f64>,
+    pub(super) t_f: DMatrix<f64>,
+    pub(super) channels: Vec<PlacedPoint>,
+    pub(super) impacts: Vec<PlacedPoint>,
+    pub(super) points: usize,
+    pub(super) translations: Axes,
+    pub(super) rotations: Axes,
+}
+
+/// Index of the degree of freedom along each axis in the IDM set, and its scale; none if the set
+/// does not contain it.
+pub(super) type Axes = [Option<(usize, f64)>; 3];
+
+impl Layout {
+    pub(super) fn new(
+        a: &LocatedVirtualPoint,
+        b: &LocatedVirtualPoint,
+        rows: &Found,
+        columns: &Found,
+        geometry: &Geometry,
+        idms: IdmSet,
+    ) -> Layout {
+        let n = idms.count();
+        let d = balance(idms);
+        let (rows_a, columns_a) = (a.rows.at.len(), a.columns.at.len());
+        let t_u = DMatrix::from_fn(2 * n, rows.at.len(), |r, c| match (r < n, c < rows_a) {
+            (true, true) => a.responses.t[(r, c)] * d[r],
+            (false, false) => b.responses.t[(r - n, c - rows_a)] * d[r - n],
+            _ => 0.0,
+        });
+        let t_f = DMatrix::from_fn(columns.at.len(), 2 * n, |r, c| match (r < columns_a, c < n) {
+            (true, true) => a.impacts.t[(r, c)] * d[c],
+            (false, false) => b.impacts.t[(r - columns_a, c - n)] * d[c - n],
+            _ => 0.0,
+        });
+        let origins = [geometry.virtual_point_a_m, geometry.virtual_point_b_m].map(Vector3::from);
+        let place = |p: &Point, side: usize, point: usize| PlacedPoint {
+            direction: p.direction(),
+            offset: p.position() - origins[side],
+            side,
+            point,
+        };
+        let mut names: Vec<&str> = Vec::new();
+        let mut channels = Vec::new();
+        for (i, channel) in rows.points.iter().enumerate() {
+            let at = names.iter().position(|name| *name == channel.name).unwrap_or(names.len());
+            if at == names.len() {
+                names.push(&channel.name);
+            }
+            channels.push(place(channel, usize::from(i >= rows_a), at));
+        }
+        let impacts = columns
+            .points
+            .iter()
+            .enumerate()
+            .map(|(i, impact)| place(impact, usize::from(i >= columns_a), i))
+            .collect();
+        let axes = |dofs: [Dof; 3]| dofs.map(|dof| idms.position(dof).map(|at| (at, d[at])));
+        let translations = axes([Dof::X, Dof::Y, Dof::Z]);
+        let rotations = axes([Dof::Rx, Dof::Ry, Dof::Rz]);
+        Layout { t_u, t_f, channels, impacts, points: names.len(), translations, rotations }
+    }
+
+    /// T_u Y T_f: reduces cells to both virtual points, rotations scaled.
+    pub(super) fn reduce(&self, cells: &Line) -> Line {
+        reduce_inputs(&reduce_outputs(&self.t_u, cells), &self.t_f)
     }
 }

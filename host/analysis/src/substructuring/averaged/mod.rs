@@ -48,7 +48,6 @@ pub use bootstrap::{CellHits, Replicates};
 
 mod assembly;
 mod bootstrap;
-mod layout;
 mod sensitivity;
 
 type Line = DMatrix<Complex<f64>>;

@@ -8,7 +8,7 @@
 //! Φ covers them all.
 
 use super::assembly::Assembly;
-use super::layout::Axes;
+use super::assembly::Axes;
 use super::{Line, Priors, compliance};
 use crate::substructuring::product::product;
 use nalgebra::{Complex, Vector3};

@@ -8,8 +8,8 @@
 //!
 //! The residual's covariance contains the noise of Y^AJB and, through Eq. (1)'s derivatives, of Y^A
 //! and Y^B, and errors of position, aim and angle with Gaussian priors. The modules: `block`: the
-//! measured data; `cell` and `nuisance`: its errors of geometry; `chart`: the parameters; `model`:
-//! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then `start`,
+//! measured data; `cell`: its errors of geometry; `chart`: the parameters; `model`:
+//! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then
 //! `solver`, `outcome`.
 
 mod assembly_aims;
@@ -20,11 +20,9 @@ mod factor;
 mod model;
 mod narrow;
 mod noise;
-mod nuisance;
 mod outcome;
 mod problem;
 mod solver;
-mod start;
 mod weight;
 
 pub use chart::FreeEntries;
@@ -39,8 +37,8 @@ use crate::frf::Frf;
 use crate::frf::noise::shared_by_lines;
 use crate::structure::Structure;
 use block::{ReceptanceBlock, Side};
+use cell::Nuisances;
 use model::Layout;
-use nuisance::Nuisances;
 use problem::Problem;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -212,9 +210,9 @@ pub fn fit(
     options: &Options,
 ) -> Result<Fitted, FitError> {
     let problem = problem(a, b, ajb, geometry, idms, band, options)?;
-    let chart = start::chart(&problem);
+    let chart = solver::chart(&problem);
     let mut best: Option<solver::SearchResult> = None;
-    for candidate in start::candidates(&problem, &chart, idms) {
+    for candidate in solver::candidates(&problem, &chart, idms) {
         let found = match solver::search(&problem, &chart, &candidate) {
             Ok(found) => found,
             // another start may succeed

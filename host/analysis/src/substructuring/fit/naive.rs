@@ -157,7 +157,7 @@ impl Case {
         let band = Band { low_hz: 300.0, high_hz: 400.0 };
         let problem =
             problem(&a, &b, &ajb, &geometry, IdmSet::Six, band, &Options::default()).expect("exact data");
-        let chart = start::chart(&problem);
+        let chart = solver::chart(&problem);
         let p = DVector::from_fn(12, |i, _| if i < 6 { [0.9, 0.8, 0.9, 0.1, 0.05, 0.1][i] } else { 0.2 });
         let eta = (0..problem.nuisances.std.len()).map(|i| (i as f64).sin()).collect();
         Case { problem, chart, p, eta }

@@ -33,7 +33,7 @@ fn the_analytic_derivatives_are_the_difference_quotients() {
     let [a, b, ajb] = &case.frf;
     let problem =
         problem(a, b, ajb, &case.geometry, IdmSet::Six, BAND, &Options::default()).expect("exact data");
-    let diagonal = start::chart(&problem);
+    let diagonal = solver::chart(&problem);
     let p = nalgebra::DVector::from_fn(12, |i, _| {
         [0.95, 0.9, 0.6, 0.05, 0.2, 0.1][i % 6] * if i < 6 { 1.0 } else { 0.3 }
     });

@@ -11,13 +11,13 @@
 use super::FitError;
 use super::assembly_aims::{AssemblyAims, Met, OfImpact};
 use super::block::{Line, ReceptanceBlock};
+use super::cell::AIMS;
 use super::cell::{CellGeometry, factors};
 use super::chart::Chart;
 use super::factor::rows as own_rows;
 use super::model::{Predicted, Slopes, Wanted};
 use super::narrow::crossed;
 use super::noise::{ByImpact, Whitening};
-use super::nuisance::AIMS;
 use super::problem::{Corrected, Problem};
 use crate::parallel::prelude::*;
 use crate::substructuring::product::product;

@@ -1,6 +1,6 @@
 //! The derivatives of Z_dd, as sums of dyads over the cells of measured blocks.
 
-use crate::substructuring::measured_set::{Balanced, Side};
+use crate::substructuring::interface_data::{Balanced, Side};
 use crate::substructuring::product::product;
 use crate::vectors::wide;
 use nalgebra::{Complex, DMatrix};

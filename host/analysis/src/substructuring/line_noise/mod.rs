@@ -16,9 +16,9 @@ use super::decoupling::{
 };
 use super::idm::Dof;
 use super::interface_data::balance;
+use super::interface_data::{MeasuredSet, Side};
 use super::internal_dofs::Rearrangement;
 use super::joint_over_bands::median;
-use super::measured_set::{MeasuredSet, Side};
 use super::method::Method;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
