@@ -187,14 +187,18 @@ impl<'a> ChannelView<'a> {
 
     /// Appends the samples times `factor` to `out`.
     pub fn scaled(self, factor: f64, out: &mut Vec<f64>) {
-        each_type!(ChannelView, self, samples => out.extend(samples.iter().map(|s| f64::from(*s) * factor)));
+        fn of<T: Copy + Into<f64>>(samples: &[T], factor: f64, out: &mut Vec<f64>) {
+            out.extend(samples.iter().map(|sample| (*sample).into() * factor));
+        }
+        each_type!(ChannelView, self, samples => of(samples, factor, out));
     }
 
     /// Passes each sample to `put` with the value in the same place of `targets`.
     pub fn put(self, targets: &mut [f64], put: impl Fn(&mut f64, f64)) {
-        each_type!(ChannelView, self, samples => {
-            targets.iter_mut().zip(samples).for_each(|(target, s)| put(target, f64::from(*s)));
-        });
+        fn of<T: Copy + Into<f64>>(samples: &[T], targets: &mut [f64], put: impl Fn(&mut f64, f64)) {
+            targets.iter_mut().zip(samples).for_each(|(target, sample)| put(target, (*sample).into()));
+        }
+        each_type!(ChannelView, self, samples => of(samples, targets, put));
     }
 
     /// Number of codes at an end of the converter's range of `bits`; 0 for values that are no codes.

@@ -113,7 +113,7 @@ fn key_of(row: &Row<'_>, keys: &[usize]) -> rusqlite::Result<String> {
 /// files lack contributes nothing.
 fn digest(row: &Row<'_>) -> rusqlite::Result<[u8; 32]> {
     let mut hasher = Sha256::new();
-    for (place, column) in row.as_ref().column_names().into_iter().enumerate() {
+    for (place, column) in row.as_ref().column_names().enumerate() {
         let value = row.get_ref(place)?;
         if row_seal::counts(column, value) {
             row_seal::each(value, |bytes| hasher.update(bytes));

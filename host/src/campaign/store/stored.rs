@@ -90,13 +90,11 @@ impl Stored for SampleTypes {
     }
 
     fn load(value: ValueRef<'_>) -> Option<Self> {
-        match value {
-            ValueRef::Null => Some(Self(None)),
-            _ => {
-                let types: Option<Vec<_>> = value.as_str().ok()?.split(' ').map(SampleType::named).collect();
-                types.map(|types| Self(Some(types)))
-            }
+        if value == ValueRef::Null {
+            return Some(Self(None));
         }
+        let types: Option<Vec<_>> = value.as_str().ok()?.split(' ').map(SampleType::named).collect();
+        types.map(|types| Self(Some(types)))
     }
 }
 

@@ -58,13 +58,15 @@ pub(super) struct Columns<'a> {
     pub(super) si: bool,
 }
 
+/// Name and type of each channel.
+type TypedChannels<'a> = Vec<(&'a str, SampleType)>;
+
 /// Records that share a file.
 struct RecordPart<'a> {
     /// Path relative to the export's folder.
     file: String,
     configuration: &'static str,
-    /// Name and type of each channel.
-    channels: Vec<(&'a str, SampleType)>,
+    channels: TypedChannels<'a>,
     records: Vec<Sampled<'a>>,
 }
 
@@ -139,8 +141,7 @@ impl Columns<'_> {
         maps: &'r BTreeMap<i64, ChannelMap>,
     ) -> Result<Vec<RecordPart<'r>>, CliError> {
         let cells: BTreeMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
-        let mut together: BTreeMap<(&'static str, Vec<(&str, SampleType)>), Vec<Sampled<'_>>> =
-            BTreeMap::new();
+        let mut together: BTreeMap<(&'static str, TypedChannels<'_>), Vec<Sampled<'_>>> = BTreeMap::new();
         for row in rows.iter().filter(|row| self.what.counts(row)) {
             // foreign keys of the file guarantee that both exist
             let (Some(cell), Some(map)) = (cells.get(&row.cell), maps.get(&row.session)) else { continue };

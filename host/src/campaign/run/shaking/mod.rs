@@ -661,6 +661,7 @@ impl ChannelLimits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::samples::ChannelSamples;
     use jointrig_protocol::channel::{Channel, Quantity};
 
     fn map() -> ChannelMap {
@@ -706,6 +707,17 @@ mod tests {
             let got = meter.amplitude(&codes, 3);
             assert!((got / (3f64.sqrt() * 1e-7) - 1.0).abs() < 1e-3, "{frequency_hz} Hz: {got}");
             assert_eq!(Meter::new(&map, Held::Force, frequency_hz).amplitude(&codes, 3), 0.0);
+            // the stored level gives the same number, and in SI units one as near
+            let stored = by_channel(&codes, 3);
+            let of = |map: &ChannelMap, samples: &Samples| {
+                Meter::of_record(map, Held::Displacement, frequency_hz, samples)
+            };
+            assert_eq!(of(&map, &stored), got);
+            let si = (0..3).map(|place| ChannelSamples::F64(map.to_si(place, stored.channel(place))));
+            let si = Samples::new(si.collect()).expect("equally long");
+            let mut in_si = map.clone();
+            in_si.channels.iter_mut().for_each(|channel| channel.units_per_volt = 1.0);
+            assert!((of(&in_si, &si) / got - 1.0).abs() < 1e-12);
         }
     }
 
