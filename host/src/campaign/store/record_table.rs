@@ -168,7 +168,11 @@ impl Store {
     /// Total size of all samples, bytes: as stored, and as they came.
     pub fn sample_bytes(&self) -> Result<(u64, u64), StoreError> {
         let measure = || {
-            let (mut stored, mut raw) = (0, 0);
+            let (mut stored, mut raw) = (0_u64, 0_u64);
+            // a damaged row may claim anything
+            let count = |row: &rusqlite::Row<'_>, place: usize| -> rusqlite::Result<u64> {
+                Ok(u64::try_from(row.get::<_, i64>(place)?).unwrap_or(0))
+            };
             for (table, of) in [("seals", "records LEFT JOIN seals ON record = id"), ("levels", "levels")] {
                 let there = self.connection.column_exists(None, table, SINCE_3)?;
                 let types = if there { SINCE_3 } else { "NULL" };
@@ -176,12 +180,13 @@ impl Store {
                 let mut statement = self.connection.prepare_cached(&sql)?;
                 let mut rows = statement.query([])?;
                 while let Some(row) = rows.next()? {
-                    let (size, scans, channels): (u64, u64, u64) = (row.get(0)?, row.get(1)?, row.get(2)?);
+                    let (size, scans, channels) = (count(row, 0)?, count(row, 1)?, count(row, 2)?);
                     let names: Option<String> = row.get(3)?;
-                    let scan = names.map_or(2 * channels, |names| {
+                    let scan = names.map_or(channels.saturating_mul(2), |names| {
                         names.split(' ').filter_map(SampleType::named).map(|of| of.bytes() as u64).sum()
                     });
-                    (stored, raw) = (stored + size, raw + scan * scans);
+                    stored = stored.saturating_add(size);
+                    raw = raw.saturating_add(scan.saturating_mul(scans));
                 }
             }
             Ok((stored, raw))

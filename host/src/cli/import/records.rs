@@ -129,7 +129,9 @@ pub(super) fn import(
     if already > 0 {
         lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
     }
-    lines.push(format!("stored with every digit: {}", types.join(", ")));
+    if already < hits {
+        lines.push(format!("stored with every digit: {}", types.join(", ")));
+    }
     output::lines(lines)
 }
 
