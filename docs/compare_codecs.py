@@ -11,7 +11,7 @@ file = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True)
 some = int(sys.argv[2]) if len(sys.argv) > 2 else 40
 query = "SELECT samples, channels, scans, crc32 FROM records WHERE scans > 0 ORDER BY (id * 7919) % 1009 LIMIT ?"
 records = [codes(*stored) for stored in file.execute(query, [some])]
-raw = sum(record.nbytes for record in records)
+raw = sum(row.nbytes for record in records for row in record)
 config = ChunkConfig(compression_level=6, mode_spec=ModeSpec.classic(), delta_spec=DeltaSpec.auto())
 
 

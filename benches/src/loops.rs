@@ -6,8 +6,8 @@ use super::peers::{self, Peers};
 use super::row::{RUNS, Row, quickest};
 use jointrig::campaign::plan::level::{Held, Level};
 use jointrig::campaign::run::shaking::record;
-use jointrig::campaign::store::record_table::Samples;
 use jointrig::device::channels::ChannelMap;
+use jointrig::device::samples::{ChannelView, Samples};
 use jointrig::hysteresis::{Correction, LoopAnalysis, analyse_both};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 /// The single row of this part.
 pub fn rows(all: &Peers) -> Outcome<Vec<Row>> {
     let map = channels()?;
-    let samples = Samples { codes: codes(&map), channels: map.len() };
+    let samples = Samples::of_codes(&codes(&map), map.len());
     let level =
         Level { frequency_hz: FREQUENCY_HZ, end_hz: None, held: Held::Displacement, amplitude: 1.5e-7 };
     let mut found = both(&map, &samples, &level)?;
@@ -56,7 +56,7 @@ pub fn rows(all: &Peers) -> Outcome<Vec<Row>> {
         }
     }
     let peer = theirs.as_ref().and_then(|t| peers::quickest(&t["seconds"]));
-    let megabytes = (2 * samples.codes.len()) as f64 / 1e6;
+    let megabytes = (2 * samples.scans() * samples.channels()) as f64 / 1e6;
     Ok(vec![
         Row::of(format!("loops, {SECONDS} s of {} channels ({megabytes:.0} MB of codes)", map.len()), ours)
             .beside("numpy", peer, 6.0)
@@ -70,8 +70,14 @@ fn one_pass(map: &ChannelMap, samples: &Samples) -> f64 {
     let places: Vec<usize> = (0..map.len()).filter(|place| wanted(map.channels[*place].role)).collect();
     places
         .par_iter()
-        .map(|place| samples.channel(*place).iter().map(|code| f64::from(*code)).sum::<f64>())
+        .map(|place| codes_of(samples.channel(*place)).iter().map(|code| f64::from(*code)).sum::<f64>())
         .sum()
+}
+
+/// The codes of a channel that has 16-bit codes.
+fn codes_of(channel: ChannelView<'_>) -> &[i16] {
+    let ChannelView::I16(codes) = channel else { return &[] };
+    codes
 }
 
 /// Loops with the raw and with the corrected force.
@@ -147,7 +153,10 @@ fn numpy(all: &Peers, folder: &Path, samples: &Samples, map: &ChannelMap) -> Out
         return Ok(None);
     }
     let path = folder.join("codes.bin");
-    std::fs::write(&path, samples.codes.iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>())?;
+    std::fs::write(
+        &path,
+        samples.each().flat_map(codes_of).flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>(),
+    )?;
     let place = |role| map.place(role).ok_or("no such channel");
     let job = json!({
         "path": path, "channels": map.len(), "rate": RATE_HZ, "frequency": FREQUENCY_HZ,

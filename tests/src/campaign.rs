@@ -12,6 +12,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::campaign::verdict::judge::ByRecord;
 use jointrig::campaign::watch::Watchers;
+use jointrig::device::samples::Samples;
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 
@@ -45,14 +46,14 @@ fn with_cells(whole: &str, cells: &[(&str, &[&str], &[&str])]) -> String {
 }
 
 /// One record, reduced to what must be the same in two runs.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 pub struct Kept {
     /// Cell and attempt.
     pub place: (i64, u32),
     /// Its verdict.
     pub verdict: &'static str,
-    /// Every code of every channel, relative to the trigger.
-    pub codes: Vec<i16>,
+    /// The samples of every channel.
+    pub samples: Samples,
 }
 
 /// Runs the plan over `transport`, to its end or to the first error.
@@ -102,7 +103,7 @@ pub fn records(file: &Path) -> Vec<Kept> {
         .map(|row| Kept {
             place: (row.cell, row.attempt),
             verdict: row.standing().name(),
-            codes: store.samples(row).unwrap().codes,
+            samples: store.samples(row).unwrap(),
         })
         .collect()
 }

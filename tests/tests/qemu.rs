@@ -15,6 +15,7 @@ use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::address::Address;
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::logs::Tables;
+use jointrig::device::samples::{ChannelView, Samples};
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
 use jointrig_tests::campaign::{origins, rows, run, small_plan};
@@ -22,11 +23,11 @@ use jointrig_tests::command::Served;
 
 const SEED: u64 = 7;
 
-/// A stored record: its row with all columns, the codes of each channel, and the channels' scales.
+/// A stored record: its row with all columns, the samples, and the channels' scales.
 #[derive(Debug, PartialEq)]
 struct Stored {
     row: RecordRow,
-    codes: Vec<Vec<i16>>,
+    samples: Samples,
     channels: ChannelMap,
 }
 
@@ -42,8 +43,7 @@ fn over(address: &str, seed: u64) -> Vec<Stored> {
     let store = Store::open_read_only(&file).unwrap();
     let stored = |row: RecordRow| {
         let samples = store.samples(&row).unwrap();
-        let codes = (0..samples.channels).map(|channel| samples.channel(channel).to_vec()).collect();
-        Stored { codes, channels: store.channels(row.session).unwrap(), row }
+        Stored { samples, channels: store.channels(row.session).unwrap(), row }
     };
     rows(&store).into_iter().map(stored).collect()
 }
@@ -107,8 +107,8 @@ fn assert_same(address: &str, found: &[Stored], expected: &[Stored]) {
     for (found, expected) in found.iter().zip(expected) {
         assert_eq!(found.row, expected.row, "{address}");
         assert_eq!(found.channels, expected.channels, "{address}");
-        assert_eq!(found.codes.len(), expected.codes.len(), "{address}");
-        for (channel, (found, expected)) in found.codes.iter().zip(&expected.codes).enumerate() {
+        assert_eq!(found.samples.channels(), expected.samples.channels(), "{address}");
+        for (channel, (found, expected)) in found.samples.each().zip(expected.samples.each()).enumerate() {
             assert!(found == expected, "{address}: channel {channel} differs");
         }
     }
@@ -123,11 +123,13 @@ fn one_campaign_over_every_address_gives_the_same_records() {
     let native = comparables(over("sim:", SEED));
     // six records of about two seconds of all channels, in three cells; no channel is silent
     assert_eq!(native.iter().map(|stored| stored.row.cell).collect::<Vec<_>>(), [1, 1, 2, 2, 3, 3]);
-    for Stored { row, codes, channels } in &native {
+    for Stored { row, samples, channels } in &native {
         assert!(row.scans > 100_000 && row.trigger_index > 0 && row.gaps.is_empty() && row.peak_n > 30.0);
-        assert_eq!(codes.len(), channels.len());
+        assert_eq!((samples.channels(), samples.scans()), (channels.len(), row.scans));
         assert!(
-            codes.iter().all(|codes| codes.len() == row.scans && codes.iter().any(|code| *code != codes[0]))
+            samples.each().all(
+                |own| matches!(own, ChannelView::I16(codes) if codes.iter().any(|code| *code != codes[0]))
+            )
         );
     }
 
@@ -145,7 +147,7 @@ fn one_campaign_over_every_address_gives_the_same_records() {
     assert_same("qemu:", &emulated, &native);
 
     let other = over("sim:", SEED + 1);
-    assert!(other.iter().zip(&native).all(|(other, native)| other.codes != native.codes), "another seed");
+    assert!(other.iter().zip(&native).all(|(other, native)| other.samples != native.samples), "another seed");
 }
 
 /// Collects what this program logs.

@@ -8,7 +8,8 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::error::StoreError;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::channels::ChannelMap;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use jointrig::device::samples::{ChannelView, SampleType, Samples};
+use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::raised;
@@ -37,6 +38,11 @@ impl Record {
         store.channels(self.row.session).map_err(|error| raised::file(py, &self.path, &error))
     }
 
+    fn read(&self, py: Python<'_>) -> PyResult<Samples> {
+        let read = py.detach(|| Store::open_read_only(&self.path)?.samples(&self.row));
+        read.map_err(|error: StoreError| raised::file(py, &self.path, &error))
+    }
+
     /// The file, its channels, and the index of one of them.
     fn channel(&self, py: Python<'_>, name: &str) -> PyResult<(Store, ChannelMap, usize)> {
         let store =
@@ -50,6 +56,32 @@ impl Record {
         let sentence = format!("record {} has no channel `{name}`: {}", self.row.id, known.join(", "));
         Err(raised::refused(py, &sentence))
     }
+}
+
+/// The smallest type that holds every value of all channels exactly.
+fn common(samples: &Samples) -> SampleType {
+    let types = samples.types();
+    let only = |some: &[SampleType]| types.iter().all(|of| some.contains(of));
+    if only(&[SampleType::I16]) {
+        SampleType::I16
+    } else if only(&[SampleType::I16, SampleType::I32]) {
+        SampleType::I32
+    } else if only(&[SampleType::I16, SampleType::F32]) {
+        SampleType::F32
+    } else {
+        SampleType::F64
+    }
+}
+
+/// All channels in one array, each converted by `of`.
+fn together<'py, T: Element>(
+    py: Python<'py>,
+    samples: &Samples,
+    shape: [usize; 2],
+    of: impl Fn(ChannelView<'_>) -> Vec<T>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let all: Vec<T> = samples.each().flat_map(of).collect();
+    Ok(all.into_pyarray(py).reshape(shape)?.into_any())
 }
 
 #[pymethods]
@@ -154,16 +186,51 @@ impl Record {
         Ok(self.map(py, &store)?.channels.iter().map(|channel| channel.name.to_string()).collect())
     }
 
-    /// (channel, sample) int16: the codes as measured.
+    /// (channel, sample): the samples as they came, int16 from a device. Channels of several types
+    /// are in the smallest type that holds every value exactly.
     #[getter]
-    fn codes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i16>>> {
-        let read = py.detach(|| {
-            let store = Store::open_read_only(&self.path)?;
-            let samples = store.samples(&self.row)?;
-            Ok((samples.codes, [self.row.channels, self.row.scans]))
-        });
-        let (codes, shape) = read.map_err(|error: StoreError| raised::file(py, &self.path, &error))?;
-        codes.into_pyarray(py).reshape(shape)
+    fn codes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let samples = self.read(py)?;
+        let shape = [self.row.channels, self.row.scans];
+        Ok(match common(&samples) {
+            SampleType::I16 => together(py, &samples, shape, |of| match of {
+                ChannelView::I16(own) => own.to_vec(),
+                _ => Vec::new(),
+            })?,
+            SampleType::I32 => together(py, &samples, shape, |of| match of {
+                ChannelView::I16(own) => own.iter().map(|code| i32::from(*code)).collect(),
+                ChannelView::I32(own) => own.to_vec(),
+                _ => Vec::new(),
+            })?,
+            SampleType::F32 => together(py, &samples, shape, |of| match of {
+                ChannelView::I16(own) => own.iter().map(|code| f32::from(*code)).collect(),
+                ChannelView::F32(own) => own.to_vec(),
+                _ => Vec::new(),
+            })?,
+            SampleType::F64 => together(py, &samples, shape, |of| {
+                let mut own = Vec::new();
+                of.scaled(1.0, &mut own);
+                own
+            })?,
+        })
+    }
+
+    /// (sample,): one channel by its name, as it came: int16, int32, float32 or float64. Times
+    /// [`Record::scale`] it is in SI.
+    fn samples<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyAny>> {
+        let (_, _, place) = self.channel(py, channel)?;
+        Ok(match self.read(py)?.channel(place) {
+            ChannelView::I16(own) => own.to_vec().into_pyarray(py).into_any(),
+            ChannelView::I32(own) => own.to_vec().into_pyarray(py).into_any(),
+            ChannelView::F32(own) => own.to_vec().into_pyarray(py).into_any(),
+            ChannelView::F64(own) => own.to_vec().into_pyarray(py).into_any(),
+        })
+    }
+
+    /// SI units per sample of a channel as it came.
+    fn scale(&self, py: Python<'_>, channel: &str) -> PyResult<f64> {
+        let (_, map, place) = self.channel(py, channel)?;
+        Ok(self.row.sample_types.channel(place).units(&map.channels[place]))
     }
 
     /// (sample,) float64 in SI: one channel by its name, as measured; [`Record::delay_s`] is its

@@ -331,12 +331,9 @@ impl CampaignFile {
         wanted.retain(|place| seen.insert(*place));
         // exactly as many samples as the plan's length, so that two seconds give lines every 0.5 Hz
         let analysed = self.analysed.samples(record, rate);
-        store.each_channel(record, &wanted, |place, codes| {
-            let codes = &codes[analysed.start.min(codes.len())..analysed.end.min(codes.len())];
-            let write = |signal: &mut Vec<f64>| {
-                signal.clear();
-                signal.extend(map.si(place, codes));
-            };
+        store.each_channel(record, &wanted, |place, samples| {
+            let samples = samples.part(analysed.start, analysed.end);
+            let write = |signal: &mut Vec<f64>| map.si_into(place, samples, signal);
             if place == force {
                 write(&mut hit.force_n);
             }
@@ -351,9 +348,9 @@ impl CampaignFile {
                 write(&mut signals.specimen_b_m_per_s);
             }
             for (_, part) in cells.iter().filter(|(own, _)| *own == place) {
-                signals.tangential_n.resize(codes.len(), 0.0);
-                let sum = signals.tangential_n.iter_mut().zip(map.si(place, codes));
-                sum.for_each(|(sum, v)| *sum += part * v);
+                signals.tangential_n.resize(samples.len(), 0.0);
+                let units = map.units(place, samples.of()).unwrap_or(0.0);
+                samples.put(&mut signals.tangential_n, |sum, sample| *sum += part * (sample * units));
             }
         })?;
         Ok(rate)

@@ -8,6 +8,7 @@ use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Judgement, Verdict};
+use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use crate::substructuring::Frf;
 use clap::Parser;
@@ -73,7 +74,7 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
             _ => peak_n * 5e-9 * rate,
         }
     };
-    let codes = map
+    let codes: Vec<i16> = map
         .channels
         .iter()
         .flat_map(|c| {
@@ -100,8 +101,7 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
         epoch: 1,
         first_scan: 0,
         trigger_index: TRIGGER,
-        channels: map.len(),
-        codes,
+        samples: Samples::of_codes(&codes, map.len()),
         gaps: vec![],
         shot,
     }

@@ -1,4 +1,4 @@
-//! Compares what the raw codes yield with what the file states: verdicts with their measure, limit
+//! Compares what the raw samples yield with what the file states: verdicts with their measure, limit
 //! and peak, and the amplitudes of the shaker's levels.
 //!
 //! Checksums show whether a row is as it was written. This shows whether it was right: each record
@@ -18,12 +18,13 @@ use super::store::calibration_table::Calibration;
 use super::store::error::StoreError;
 use super::store::level_table::LevelRow;
 use super::store::record_table::Overrule;
-use super::store::record_table::{RecordRow, Samples};
+use super::store::record_table::RecordRow;
 use super::store::session_table::SessionInfo;
 use super::verdict::judge::{ByRecord, Judge};
 use super::verdict::others::Others;
 use super::verdict::{Judgement, Verdict};
 use crate::device::channels::ChannelMap;
+use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 
 /// Relative difference below which numbers are equal: another machine's sine may differ in the last
@@ -77,7 +78,7 @@ pub fn recheck(store: &Store, at: &dyn Fn(usize, usize)) -> Result<Rechecked, St
             let (id, was) = (level.id, level.held.show(level.reached));
             if !measured.iter().any(|amplitude| alike(*amplitude, level.reached)) {
                 let now = measured.first().map_or_else(String::new, |amplitude| level.held.show(*amplitude));
-                found.different.push(format!("level {id}: {was} in the file, but {now} from its codes"));
+                found.different.push(format!("level {id}: {was} in the file, but {now} from its samples"));
             }
         }
     }
@@ -182,8 +183,7 @@ impl<'s> Past<'s> {
             epoch: record.epoch,
             first_scan: record.first_scan,
             trigger_index: record.trigger_index,
-            channels: record.channels,
-            codes: samples.codes.clone(),
+            samples: samples.clone(),
             gaps: record.gaps.clone(),
             shot: record.shot,
         };
@@ -199,7 +199,7 @@ impl<'s> Past<'s> {
                             other.verdict == Verdict::Good
                         };
                         if good && other.channels == map.len() && self.one_import(other, record) {
-                            others.learn(plan, &map, samples.view());
+                            others.learn(plan, &map, samples);
                         }
                     }
                     let found = ByRecord.judge(cell, plan, &map, &recording, &others);
@@ -212,7 +212,7 @@ impl<'s> Past<'s> {
         }
         Ok(first.map(|found| {
             format!(
-                "record {}: `{}` ({}; peak {:.2} N) in the file, but `{}` ({}; peak {:.2} N) computed from its codes",
+                "record {}: `{}` ({}; peak {:.2} N) in the file, but `{}` ({}; peak {:.2} N) computed from its samples",
                 record.id,
                 record.verdict,
                 record.sentence,
@@ -240,14 +240,12 @@ impl<'s> Past<'s> {
             return Ok(None);
         }
         let samples = self.store.level_samples(level)?;
-        // the meter expects codes interleaved scan by scan
-        let codes: Vec<i16> = (0..level.scans)
-            .flat_map(|scan| (0..level.channels).map(move |place| (scan, place)))
-            .map(|(scan, place)| samples.channel(place).get(scan).copied().unwrap_or(0))
-            .collect();
-        let measured = |map: ChannelMap| {
-            Meter::new(&map, level.held, level.frequency_hz).amplitude(&codes, level.channels)
-        };
-        Ok(Some(self.channels(level.session)?.into_iter().map(measured).collect()))
+        let maps = self.channels(level.session)?;
+        if maps.iter().any(|map| map.len() != samples.channels()) {
+            let what = format!("level {} has more or fewer channels than its session", level.id);
+            return Err(self.store.content(what));
+        }
+        let measured = |map: &ChannelMap| Meter::of_record(map, level.held, level.frequency_hz, &samples);
+        Ok(Some(maps.iter().map(measured).collect()))
     }
 }

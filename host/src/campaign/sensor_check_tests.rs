@@ -5,6 +5,7 @@ use crate::campaign::store::record_table::NewRecord;
 use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Judgement, Verdict};
+use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::shot::{Phase, Shot};
@@ -69,7 +70,8 @@ fn recording(peak_n: f64) -> Recording {
         friction_peak_n: 0.0,
         quiet_ratio: 0.0,
     };
-    Recording { epoch: 1, first_scan: 0, trigger_index: TRIGGER, channels: 4, codes, gaps: vec![], shot }
+    let samples = Samples::of_codes(&codes, 4);
+    Recording { epoch: 1, first_scan: 0, trigger_index: TRIGGER, samples, gaps: vec![], shot }
 }
 
 fn campaign(folder: &tempfile::TempDir, map: &ChannelMap) -> Store {

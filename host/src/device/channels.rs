@@ -1,5 +1,6 @@
-//! The channel map: what each channel of a scan measures, and how a code converts to SI.
+//! The channel map: what each channel of a scan measures, and how a sample converts to SI.
 
+use super::samples::{ChannelView, SampleType};
 use jointrig_protocol::channel::{Axis, Channel, Role};
 
 /// Every channel of a scan, in order.
@@ -54,20 +55,29 @@ impl ChannelMap {
         self.channels.iter().position(|channel| channel.name == name)
     }
 
-    /// The codes of the channel at `place` in SI units
+    /// SI units per sample of this type in the channel at `place`; `None` outside the map.
+    pub fn units(&self, place: usize, of: SampleType) -> Option<f64> {
+        self.channels.get(place).map(|channel| of.units(channel))
+    }
+
+    /// The samples of the channel at `place` in SI units
     /// ([`jointrig_protocol::channel::Quantity::unit`]); empty for an index outside the map.
-    pub fn to_si(&self, place: usize, codes: &[i16]) -> Vec<f64> {
-        self.si(place, codes).collect()
+    pub fn to_si(&self, place: usize, samples: ChannelView<'_>) -> Vec<f64> {
+        let mut si = Vec::new();
+        self.si_into(place, samples, &mut si);
+        si
     }
 
-    /// As [`ChannelMap::to_si`], as an iterator.
-    pub fn si(&self, place: usize, codes: &[i16]) -> impl ExactSizeIterator<Item = f64> {
-        let channel = self.channels.get(place);
-        let (scale, codes) = channel.map_or((0.0, &[][..]), |channel| (channel.units_per_code(), codes));
-        codes.iter().map(move |code| f64::from(*code) * scale)
+    /// As [`ChannelMap::to_si`]; `si` is emptied first, and its memory reused.
+    pub fn si_into(&self, place: usize, samples: ChannelView<'_>, si: &mut Vec<f64>) {
+        si.clear();
+        if let Some(units) = self.units(place, samples.of()) {
+            samples.scaled(units, si);
+        }
     }
 
-    /// SI value of full scale of the channel at `place`, always positive; `None` outside the map.
+    /// SI value of a device's full scale of the channel at `place`, always positive; `None` outside
+    /// the map.
     pub fn full_scale(&self, place: usize) -> Option<f64> {
         Some((self.channels.get(place)?.units_per_code() * 32_768.0).abs())
     }
@@ -106,9 +116,9 @@ mod tests {
         assert_eq!(map.places(Role::LoadCell), [2, 3]);
         assert_eq!(map.place(Role::SpecimenB), None);
         assert_eq!(map.responses(), None);
-        let value = map.to_si(1, &[16_384])[0];
+        let value = map.to_si(1, ChannelView::I16(&[16_384]))[0];
         assert!((value + 0.005).abs() < 1e-9, "{value}");
         assert!((map.full_scale(1).expect("there") - 0.01).abs() < 1e-9);
-        assert!(map.to_si(9, &[1]).is_empty());
+        assert!(map.to_si(9, ChannelView::I16(&[1])).is_empty());
     }
 }

@@ -14,6 +14,7 @@ pub mod logs;
 #[cfg(feature = "sim")]
 mod qemu;
 mod requests;
+pub mod samples;
 mod serial;
 pub mod session;
 #[cfg(feature = "sim")]

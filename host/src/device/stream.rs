@@ -4,8 +4,9 @@
 //! names the missing scans, so that the session can request them; scans that the device reports as
 //! lost for good are recorded as a lost range, and the stream continues after it.
 //!
-//! A record: the raw codes of every channel around one impact.
+//! A record: the raw samples of every channel around one impact. A device's are 16-bit codes.
 
+use super::samples::{ChannelView, Samples};
 use super::tap::Tap;
 use jointrig_protocol::block::{Block, RESENT};
 use jointrig_protocol::shot::Shot;
@@ -300,7 +301,7 @@ impl Stream {
     }
 }
 
-/// One impact as measured; the raw codes are never changed.
+/// One impact as measured; the raw samples are never changed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// Epoch of the stream from which it was cut.
@@ -309,11 +310,9 @@ pub struct Recording {
     pub first_scan: u64,
     /// Number of samples before the trigger, which is also the trigger's index.
     pub trigger_index: usize,
-    /// Number of channels.
-    pub channels: usize,
-    /// Raw codes, one channel after another (the link delivers one scan after another).
-    pub codes: Vec<i16>,
-    /// Index ranges of samples that were lost for good; their codes are 0 and invalid.
+    /// The samples of each channel.
+    pub samples: Samples,
+    /// Index ranges of samples that were lost for good; they are 0 and invalid.
     pub gaps: Vec<Range<usize>>,
     /// The device's report on the shot.
     pub shot: Shot,
@@ -322,44 +321,23 @@ pub struct Recording {
 impl Recording {
     /// Samples per channel.
     pub fn scans(&self) -> usize {
-        self.codes.len().checked_div(self.channels).unwrap_or(0)
+        self.samples.scans()
     }
 
-    /// A view of its samples.
-    pub fn view(&self) -> Codes<'_> {
-        Codes { codes: &self.codes, channels: self.channels }
-    }
-
-    /// The raw codes of one channel; empty outside the map.
-    pub fn channel(&self, place: usize) -> &[i16] {
-        self.view().channel(place)
+    /// The samples of one channel; empty outside the map.
+    pub fn channel(&self, place: usize) -> ChannelView<'_> {
+        self.samples.channel(place)
     }
 }
 
-/// A view of the samples of a record.
-#[derive(Clone, Copy, Debug)]
-pub struct Codes<'a> {
-    /// Raw codes, one channel after another.
-    pub codes: &'a [i16],
-    /// Number of channels.
-    pub channels: usize,
-}
-
-impl<'a> Codes<'a> {
-    /// The raw codes of one channel; empty outside the map.
-    pub fn channel(self, place: usize) -> &'a [i16] {
-        let scans = self.codes.len().checked_div(self.channels).unwrap_or(0);
-        self.codes.get(place * scans..(place + 1) * scans).unwrap_or(&[])
-    }
-}
-
-/// Reorders codes from one scan after another to one channel after another.
-pub fn by_channel(scan_major: &[i16], channels: usize) -> Vec<i16> {
+/// Reorders codes from one scan after another, as the link delivers them, to one channel after
+/// another.
+pub fn by_channel(scan_major: &[i16], channels: usize) -> Samples {
     let mut out = Vec::with_capacity(scan_major.len());
     for place in 0..channels {
         out.extend(scan_major.iter().skip(place).step_by(channels));
     }
-    out
+    Samples::of_codes(&out, channels)
 }
 
 #[cfg(test)]
@@ -372,7 +350,9 @@ mod recording_tests {
 
     #[test]
     fn scans_are_turned_into_channels() {
-        assert_eq!(by_channel(&[1, 10, 2, 20, 3, 30], 2), [1, 2, 3, 10, 20, 30]);
-        assert!(by_channel(&[], 4).is_empty());
+        let samples = by_channel(&[1, 10, 2, 20, 3, 30], 2);
+        assert_eq!(samples.channel(0), ChannelView::I16(&[1, 2, 3]));
+        assert_eq!(samples.channel(1), ChannelView::I16(&[10, 20, 30]));
+        assert_eq!((by_channel(&[], 4).channels(), by_channel(&[], 4).scans()), (4, 0));
     }
 }

@@ -54,12 +54,16 @@ pub enum ParquetFileError {
 pub enum Stored {
     /// Converter codes: 16 bits, delta packed.
     Code,
+    /// Converter codes of 32 bits, delta packed.
+    Wide,
     /// An increasing index: 32 bits, delta packed.
     Index,
     /// Repeating numbers: 64 bits, with a dictionary.
     Id,
     /// SI values: 32 bits, split into byte streams.
     Single,
+    /// As `Single`, 64 bits.
+    Double,
     /// A column of a table, in which any value may be missing.
     Of(Kind),
 }
@@ -67,12 +71,14 @@ pub enum Stored {
 /// Values of one column in a row group.
 #[derive(Debug, Clone)]
 pub enum Values {
-    /// For [`Stored::Code`] and [`Stored::Index`].
+    /// For [`Stored::Code`], [`Stored::Wide`] and [`Stored::Index`].
     Whole(Vec<i32>),
     /// For [`Stored::Id`].
     Id(Vec<i64>),
     /// For [`Stored::Single`].
     Single(Vec<f32>),
+    /// For [`Stored::Double`].
+    Double(Vec<f64>),
     /// For [`Stored::Of`]: integers, and times in microseconds since 1970.
     MaybeWhole(Vec<Option<i64>>),
     /// For [`Stored::Of`]: real numbers.
@@ -229,10 +235,10 @@ fn schema(columns: &[(&str, Stored)]) -> Result<Type, ParquetError> {
     let field = |(name, stored): &(&str, Stored)| {
         let (physical, logical) = match stored {
             Stored::Code => (Physical::INT32, Some(LogicalType::integer(16, true))),
-            Stored::Index => (Physical::INT32, None),
+            Stored::Wide | Stored::Index => (Physical::INT32, None),
             Stored::Id | Stored::Of(Kind::Whole) => (Physical::INT64, None),
             Stored::Single => (Physical::FLOAT, None),
-            Stored::Of(Kind::Real) => (Physical::DOUBLE, None),
+            Stored::Double | Stored::Of(Kind::Real) => (Physical::DOUBLE, None),
             Stored::Of(Kind::Text) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
             Stored::Of(Kind::Utc) => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
         };
@@ -260,8 +266,8 @@ fn properties(columns: &[(&str, Stored)], notes: &[(&str, String)]) -> WriterPro
     for (name, stored) in columns {
         let path = || ColumnPath::from(*name);
         let encoding = match stored {
-            Stored::Code | Stored::Index => Encoding::DELTA_BINARY_PACKED,
-            Stored::Single => Encoding::BYTE_STREAM_SPLIT,
+            Stored::Code | Stored::Wide | Stored::Index => Encoding::DELTA_BINARY_PACKED,
+            Stored::Single | Stored::Double => Encoding::BYTE_STREAM_SPLIT,
             Stored::Id | Stored::Of(_) => continue,
         };
         properties =
@@ -281,6 +287,9 @@ fn group(writer: &mut SerializedFileWriter<Summed>, columns: &[Values]) -> Resul
             (ColumnWriter::Int32ColumnWriter(out), Values::Whole(all)) => out.write_batch(all, None, None)?,
             (ColumnWriter::Int64ColumnWriter(out), Values::Id(all)) => out.write_batch(all, None, None)?,
             (ColumnWriter::FloatColumnWriter(out), Values::Single(all)) => {
+                out.write_batch(all, None, None)?
+            }
+            (ColumnWriter::DoubleColumnWriter(out), Values::Double(all)) => {
                 out.write_batch(all, None, None)?
             }
             (ColumnWriter::Int64ColumnWriter(out), Values::MaybeWhole(all)) => {

@@ -199,9 +199,9 @@ const FORCE_LINES: usize = 16;
 const DROP_DB: f64 = 6.0;
 /// The force spectrum is shown up to this multiple of the band's upper end; beyond it is noise.
 const BEYOND: f64 = 2.5;
-/// Smallest magnitude shown, relative to the largest: a 16-bit converter (96 dB) cannot distinguish
+/// Smallest magnitude shown, relative to the largest: a front end of 120 dB cannot distinguish
 /// smaller values from noise.
-const LOWEST: f64 = 1e-5;
+const LOWEST: f64 = 1e-6;
 
 /// The spectrum of a hit's force, with the band in which it stays within 6 dB.
 ///

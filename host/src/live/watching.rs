@@ -11,7 +11,6 @@ use super::now::{Disk, Doing, Limit, Link, Shaker, Signals, State, StreamInfo};
 use super::watcher::{WatchQueue, WatchReport, room};
 use crate::campaign::plan::level::Level;
 use crate::campaign::run::shaking::record;
-use crate::campaign::store::record_table::Samples;
 use crate::device::channels::ChannelMap;
 use crate::device::stream::by_channel;
 use crate::device::tap::{Envelope, NOTHING, View};
@@ -336,7 +335,7 @@ pub fn turn(
         return None;
     }
     let from = scans - cycle - 2 * spare;
-    let samples = Samples { codes: by_channel(&codes[from * count..scans * count], count), channels: count };
+    let samples = by_channel(&codes[from * count..scans * count], count);
     let record = record(channels, load_cells, &samples, level).ok()?;
     let RelativeMotion::Velocity { a_m_per_s, b_m_per_s } = &record.motion else { return None };
     let length = a_m_per_s.len().min(b_m_per_s.len()).min(record.force_n.len());

@@ -3,7 +3,7 @@
 
 use jointrig::exchange::frf_uff::{to_functions, write_uff};
 use jointrig::exchange::uff::Encoding;
-use jointrig::exchange::{read_frf, write_frf, write_impacts};
+use jointrig::exchange::{read_frf, read_impacts, write_frf, write_impacts};
 use jointrig::spectra::{ImpactRecords, MotionQuantity};
 use jointrig::substructuring::Frf;
 use num_complex::Complex;
@@ -325,4 +325,34 @@ fn frf_and_import_refuse_the_same_hits_for_the_same_reasons() {
         assert!(said.starts_with("0 ") && said.contains("hit 0: good"), "{said}");
         assert!(said.contains("hit 1: noisy") && said.contains("a dropout or spike"), "{said}");
     }
+}
+
+#[test]
+fn the_frf_of_imported_records_is_that_of_their_arrays_to_the_last_digit() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let mut records = soft_hits(2048.0, 4.0, 0.05, 2e-3);
+    // hits that differ
+    for (hit, x) in records.response.iter_mut().enumerate() {
+        x[0].iter_mut().for_each(|v| *v *= 1.0 + 0.1 * hit as f64);
+    }
+    write_impacts(&folder.join("hits.npz"), &records).expect("written");
+    std::fs::write(folder.join("plan.toml"), ONE_CELL).expect("written");
+    done(folder, &["frf", "hits.npz", "--sigma", "0", "--out", "h.npz"]);
+    done(folder, &["campaign", "new", "c.jrig", "--plan", "plan.toml"]);
+    let told = done(folder, &[&["import", "hits.npz"], &CELL[..]].concat());
+    assert!(told.contains("stored with every digit: force f64"), "{told}");
+    done(folder, &["export", "c.jrig", "--format", "npz", "--out", "x"]);
+    let [direct, imported] =
+        ["h.npz", "x/frf/A.npz"].map(|file| read_frf(&folder.join(file)).expect("written"));
+    let mut compared = 0;
+    for (line, f) in imported.frequency_hz().iter().enumerate() {
+        let Some(other) = direct.frequency_hz().iter().position(|own| own == f) else { continue };
+        assert_eq!(imported.lines()[line][(0, 0)], direct.lines()[other][(0, 0)], "{f} Hz");
+        compared += 1;
+    }
+    assert!(compared > 100, "{compared} lines");
+    // and the records come out as they went in
+    let back = read_impacts(&folder.join("x/records/A_AZ1_A1.npz")).expect("exported");
+    assert_eq!((back.force_n, back.response), (records.force_n, records.response));
 }

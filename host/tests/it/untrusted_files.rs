@@ -317,7 +317,7 @@ fn campaign_files_that_claim_too_much_are_refused_or_named() {
         ("UPDATE sessions SET rate_hz = 0", ["of `sessions` was changed", "0 Hz"]),
         ("UPDATE frfs SET frf = zeroblob(500000000)", ["FRFs", "frfs"]),
         ("PRAGMA user_version = -1", ["version", "version"]),
-        ("PRAGMA user_version = 3", ["version", "version"]),
+        ("PRAGMA user_version = 4", ["version", "version"]),
         (
             "PRAGMA foreign_keys = OFF; DROP TABLE cells; CREATE VIEW cells AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) \
              SELECT i AS id, 'A' AS configuration, 'x' AS impact, 'y' AS response, 1 AS wanted, NULL AS given_up, NULL AS settled FROM n",

@@ -12,6 +12,7 @@ use jointrig::campaign::store::session_table::{Counters, SessionInfo};
 use jointrig::campaign::store::stored::Hex;
 use jointrig::campaign::verdict::{Verdict, Judgement};
 use jointrig::device::channels::ChannelMap;
+use jointrig::device::samples::Samples;
 use jointrig::device::stream::Recording;
 use jointrig::report;
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
@@ -145,9 +146,9 @@ fn record(cell: i64, attempt: u32, session: i64) -> NewRecord {
         })
     };
     let hz = 400.0 + 30.0 * cell as f64;
-    let codes = force.chain(motion(hz)).chain(motion(1.3 * hz)).chain(motion(1.7 * hz)).collect();
+    let codes: Vec<i16> = force.chain(motion(hz)).chain(motion(1.3 * hz)).chain(motion(1.7 * hz)).collect();
     let recording =
-        Recording { epoch: 3, first_scan: 144, trigger_index: 256, channels: 4, codes, gaps: vec![], shot };
+        Recording { epoch: 3, first_scan: 144, trigger_index: 256, samples: Samples::of_codes(&codes, 4), gaps: vec![], shot };
     let verdict = Judgement { peak_n: 49.0, ..Judgement::without_pulse(Verdict::Good, 49.0, 30.0, "one clean pulse".into()) };
     NewRecord { cell, attempt, session, utc: "2026-01-01T00:00:00Z".into(), utc_error_s: None, recording, verdict }
 }

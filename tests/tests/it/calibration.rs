@@ -4,6 +4,7 @@
 
 use jointrig::campaign::plan::{CONTACT, SMALL};
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::codec;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::device::channels::ChannelMap;
 use jointrig_tests::command::jointrig;
@@ -13,12 +14,12 @@ use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// A hash over all raw codes, and every scale with which the sessions were measured.
+/// A hash over all raw samples, and every scale with which the sessions were measured.
 fn measured(file: &Path) -> (u64, Vec<f32>) {
     let store = Store::open_read_only(file).unwrap();
     let mut hash = DefaultHasher::new();
     for record in store.records().unwrap().into_iter().flatten() {
-        store.samples(&record).unwrap().codes.hash(&mut hash);
+        codec::checksum(&store.samples(&record).unwrap()).hash(&mut hash);
     }
     let map = store.channels_as_measured(1).unwrap();
     (hash.finish(), map.channels.iter().map(|channel| channel.units_per_volt).collect())

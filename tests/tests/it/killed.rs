@@ -21,7 +21,7 @@ type Content = BTreeMap<(i64, u32), (String, String, u32)>;
 fn content(file: &Path) -> Content {
     let store = Store::open_read_only(file).unwrap();
     let row = |row: &jointrig::campaign::store::record_table::RecordRow| {
-        let crc = codec::checksum(&store.samples(row).unwrap().codes);
+        let crc = codec::checksum(&store.samples(row).unwrap());
         ((row.cell, row.attempt), (row.verdict.name().to_owned(), format!("{:?}", row.measure), crc))
     };
     rows(&store).iter().map(row).collect()

@@ -187,8 +187,7 @@ fn a_stored_verdict_is_on_the_page_at_once() {
             epoch: 1,
             first_scan: 1_000_000 * u64::from(n),
             trigger_index: row.trigger_index,
-            channels: row.channels,
-            codes: samples.codes.clone(),
+            samples: samples.clone(),
             gaps: Vec::new(),
             shot: row.shot,
         };

@@ -35,8 +35,7 @@ fn the_second_hit_on_a_is_not_spoilt_by_the_first() {
     let samples = store.samples(&rows[1]).unwrap();
     let si = |name: &str| -> Vec<f64> {
         let place = channels.channels.iter().position(|channel| channel.name == name).unwrap();
-        let unit = channels.channels[place].units_per_code();
-        samples.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
+        channels.to_si(place, samples.channel(place))
     };
     let (force, velocity) = (si("force"), si("vib_z"));
 

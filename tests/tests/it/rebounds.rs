@@ -9,6 +9,7 @@ use jointrig::campaign::verdict::judge::{ByRecord, Judge};
 use jointrig::campaign::verdict::others::Others;
 use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::device::channels::ChannelMap;
+use jointrig::device::samples::Samples;
 use jointrig::device::stream::Recording;
 use jointrig_hil_sim::rig::{self, Measured, Rig, RigConfig};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
@@ -85,8 +86,7 @@ fn judge(plan: &Plan, map: &ChannelMap, channels: &[Vec<i16>]) -> Judgement {
         epoch: 0,
         first_scan: 0,
         trigger_index: PRE,
-        channels: map.len(),
-        codes: channels.concat(),
+        samples: Samples::of_codes(&channels.concat(), map.len()),
         gaps: Vec::new(),
         shot: Shot {
             number: 1,

@@ -71,8 +71,7 @@ fn a_verdict_that_does_not_follow_is_named_although_every_seal_fits() {
         epoch: row.epoch,
         first_scan: row.first_scan,
         trigger_index: row.trigger_index,
-        channels: row.channels,
-        codes: store.samples(&row).unwrap().codes,
+        samples: store.samples(&row).unwrap(),
         gaps: row.gaps.clone(),
         shot: row.shot,
     };
@@ -105,8 +104,7 @@ fn a_verdict_that_does_not_follow_is_named_although_every_seal_fits() {
         settled,
         epoch: level.epoch,
         first_scan: level.first_scan,
-        channels: level.channels,
-        codes: store.level_samples(&level).unwrap().codes,
+        samples: store.level_samples(&level).unwrap(),
         gaps: Vec::new(),
     };
     store.insert_level(&false_level).unwrap();

@@ -83,12 +83,12 @@ fn clock_and_edges_are_stored_and_exported() {
     let alone = folder.path().join("b.jrig");
     measure(&alone, &plan(""), |_| {}).unwrap();
     assert_eq!(noted(&alone), (Vec::new(), Vec::new()), "a plan without [sync] stores none of it");
-    let codes = |file: &Path| {
+    let samples = |file: &Path| {
         let store = Store::open_read_only(file).unwrap();
         let records = store.records().unwrap().into_iter().flatten();
-        records.map(|record| store.samples(&record).unwrap().codes).collect::<Vec<_>>()
+        records.map(|record| store.samples(&record).unwrap()).collect::<Vec<_>>()
     };
-    assert!(codes(&file) == codes(&alone));
+    assert!(samples(&file) == samples(&alone));
 
     let out = folder.path().join("out");
     done(

@@ -14,6 +14,7 @@ use super::shot::{Outcome, QuietLimits, STEPS_PER_RING, Shooter, no_shot};
 use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
 use crate::device::error::DeviceError;
+use crate::device::samples::ChannelView;
 use crate::device::session::Session;
 
 /// Time over which the motion before a hit is measured, s: two periods of the slowest mode of
@@ -94,7 +95,8 @@ impl Shooter {
         let level_n = f64::from(self.trigger.level_n);
         let (codes, _) = session.cut(range.clone())?;
         let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[force]).collect();
-        let found = channels.to_si(force, &own).iter().position(|force_n| *force_n >= level_n);
+        let found =
+            channels.to_si(force, ChannelView::I16(&own)).iter().position(|force_n| *force_n >= level_n);
         Ok(found.map(|scan| range.start + scan as u64))
     }
 
@@ -110,7 +112,7 @@ impl Shooter {
         let (codes, _) = session.cut(range)?;
         let ratio = |(place, limit): (usize, &f32)| {
             let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[place]).collect();
-            (place, rms_of_means(&channels.to_si(place, &own)) / f64::from(*limit))
+            (place, rms_of_means(&channels.to_si(place, ChannelView::I16(&own))) / f64::from(*limit))
         };
         let bounded = quiet.iter().enumerate().filter(|(_, limit)| **limit > 0.0);
         Ok(bounded.map(ratio).filter(|(_, ratio)| *ratio > 1.0).max_by(|a, b| a.1.total_cmp(&b.1)))
@@ -124,7 +126,7 @@ impl Shooter {
             Some(force) => {
                 let (codes, _) = session.cut(listened)?;
                 let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[force]).collect();
-                channels.to_si(force, &own).into_iter().fold(0.0, f64::max)
+                channels.to_si(force, ChannelView::I16(&own)).into_iter().fold(0.0, f64::max)
             }
         };
         let none = no_shot(self.number, 0);

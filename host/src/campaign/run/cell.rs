@@ -19,6 +19,7 @@ use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Judgement, Verdict};
 use crate::campaign::watch::{Left, Seen, Standing};
 use crate::device::channels::ChannelMap;
+use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Quantity;
 use jointrig_protocol::shot::Shot;
@@ -105,7 +106,7 @@ impl Runner<'_> {
                     self.saw(&Seen::Judging);
                     let verdict = self.judge.judge(&row.cell, self.plan, self.channels, &recording, &others);
                     if verdict.kind == Verdict::Good {
-                        others.learn(self.plan, self.channels, recording.view());
+                        others.learn(self.plan, self.channels, &recording.samples);
                     }
                     self.keep(row, *recording, verdict)?;
                 }
@@ -138,8 +139,7 @@ impl Runner<'_> {
                         epoch: 0,
                         first_scan: shot.fired_at,
                         trigger_index: 0,
-                        channels: self.channels.len(),
-                        codes: Vec::new(),
+                        samples: Samples::of_codes(&[], self.channels.len()),
                         gaps: Vec::new(),
                         shot: Shot { peak_n: 0.0, ..shot },
                     };
@@ -268,8 +268,8 @@ impl Runner<'_> {
 /// The checksum of a shot's samples, if it was fired: a missed shot has no samples.
 fn crc_of(outcome: &Outcome) -> Option<u32> {
     match outcome {
-        Outcome::Recorded(recording) => Some(codec::checksum(&recording.codes)),
-        Outcome::Missed { .. } => Some(codec::checksum(&[])),
+        Outcome::Recorded(recording) => Some(codec::checksum(&recording.samples)),
+        Outcome::Missed { .. } => Some(codec::checksum(&Samples::default())),
         _ => None,
     }
 }
@@ -361,10 +361,11 @@ pub fn after(recording: &Recording, channels: &ChannelMap, settle: &Settle, allo
                 Quantity::Acceleration => settle.quiet_floor_m_per_s * 2.0 * PI * PERIODS / FOR_S,
                 Quantity::Displacement | Quantity::Force | Quantity::Voltage => return 0.0,
             };
-            let codes = recording.channel(place);
-            let window = codes.get(from.min(codes.len())..to.min(codes.len())).unwrap_or(&[]);
-            let power: f64 = window.iter().map(|code| f64::from(*code).powi(2)).sum();
-            let rms = (power / window.len().max(1) as f64).sqrt() * channel.units_per_code().abs();
+            let samples = recording.channel(place);
+            let mut window = Vec::new();
+            samples.part(from, to).scaled(1.0, &mut window);
+            let power: f64 = window.iter().map(|sample| sample.powi(2)).sum();
+            let rms = (power / window.len().max(1) as f64).sqrt() * samples.of().units(channel).abs();
             (allowance * (settle.quiet_relative * rms).max(floor)) as f32
         })
         .collect()

@@ -482,7 +482,7 @@ fn learnt(
     let kept = |record: &&RecordRow| record.kept() && record.channels == channels.len();
     for record in records.iter().flatten().filter(kept) {
         match store.samples(record) {
-            Ok(samples) => others.learn(plan, channels, samples.view()),
+            Ok(samples) => others.learn(plan, channels, &samples),
             Err(error @ StoreError::Damaged { .. }) => log::warn!("{error}"),
             Err(error) => return Err(error),
         }

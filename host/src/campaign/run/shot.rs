@@ -257,8 +257,7 @@ impl Shooter {
             epoch: self.epoch,
             first_scan,
             trigger_index: (shot.trigger - first_scan) as usize,
-            channels: self.channels,
-            codes: by_channel(&codes, self.channels),
+            samples: by_channel(&codes, self.channels),
             gaps,
             shot: *shot,
         })

@@ -119,7 +119,10 @@ impl Store {
             if calibration.from_session > session {
                 continue;
             }
-            let own = |channel: &&mut Channel| channel.name == calibration.channel.as_str();
+            // samples in SI units come from no known voltage
+            let own = |channel: &&mut Channel| {
+                channel.name == calibration.channel.as_str() && channel.range_v > 0.0
+            };
             if let Some(channel) = map.channels.iter_mut().find(own) {
                 calibration.apply(channel);
             }

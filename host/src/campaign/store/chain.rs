@@ -19,7 +19,7 @@ use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use sha2::{Digest, Sha256};
 
-use super::WRITTEN;
+use super::{WRITTEN, row_seal};
 
 /// Tables of the chain itself.
 pub(super) const TABLES: &str = "
@@ -109,11 +109,15 @@ fn key_of(row: &Row<'_>, keys: &[usize]) -> rusqlite::Result<String> {
     Ok(keys.iter().map(one).collect::<rusqlite::Result<Vec<_>>>()?.join("/"))
 }
 
-/// SHA-256 over all columns of a row, each with its type and length.
+/// SHA-256 over all columns of a row, each with its type and length; a null in a column that older
+/// files lack contributes nothing.
 fn digest(row: &Row<'_>) -> rusqlite::Result<[u8; 32]> {
     let mut hasher = Sha256::new();
-    for place in 0..row.as_ref().column_count() {
-        super::row_seal::each(row.get_ref(place)?, |bytes| hasher.update(bytes));
+    for (place, column) in row.as_ref().column_names().enumerate() {
+        let value = row.get_ref(place)?;
+        if row_seal::counts(column, value) {
+            row_seal::each(value, |bytes| hasher.update(bytes));
+        }
     }
     Ok(hasher.finalize().into())
 }

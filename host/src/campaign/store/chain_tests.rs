@@ -7,6 +7,7 @@ use crate::campaign::store::session_table::{Counters, SessionInfo};
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::{Judgement, Verdict};
 use crate::device::channels::ChannelMap;
+use crate::device::samples::{ChannelSamples, Samples};
 use crate::device::stream::Recording;
 use crate::frf::{Frf, MotionQuantity};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
@@ -47,9 +48,17 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
         friction_peak_n: 17.0,
         quiet_ratio: 0.3,
     };
-    let codes = (0..400_i32).map(|i| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16).collect();
-    let recording =
-        Recording { epoch: 3, first_scan: 144, trigger_index: 25, channels: 2, codes, gaps: vec![], shot };
+    let code = |i: i32| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16;
+    // every second record has wider samples
+    let samples = match attempt % 2 {
+        0 => Samples::of_codes(&(0..400).map(code).collect::<Vec<_>>(), 2),
+        _ => Samples::new(vec![
+            ChannelSamples::I32((0..200).map(|i| 70_000 * i32::from(code(i))).collect()),
+            ChannelSamples::F64((0..200).map(|i| 0.1 * f64::from(code(i))).collect()),
+        ])
+        .expect("equally long"),
+    };
+    let recording = Recording { epoch: 3, first_scan: 144, trigger_index: 25, samples, gaps: vec![], shot };
     let verdict = Judgement { peak_n: 49.5, ..Judgement::without_pulse(kind, 0.1, 0.02, "because".into()) };
     NewRecord {
         cell,

@@ -7,10 +7,11 @@ use super::Store;
 use super::codec::{self, CodecError};
 use super::error::StoreError;
 use super::notes::utc_now;
-use super::record_table::Samples;
 use super::row_seal;
+use super::stored::SampleTypes;
 use super::table::{Row, insert, table};
 use crate::campaign::plan::level::{Held, Level, Moment};
+use crate::device::samples::Samples;
 
 table! {
     /// A stored level without its samples: the columns that the seal covers. One row per recorded
@@ -52,10 +53,12 @@ table! {
             channels: usize = "channels INTEGER NOT NULL",
             /// Missing samples, as index ranges.
             gaps: Vec<Range<usize>> = "gaps TEXT NOT NULL",
-            /// CRC-32 of the raw codes.
+            /// CRC-32 of the raw samples.
             crc: u32 = "crc32 INTEGER NOT NULL",
-            /// CRC-32 of the bytes that hold the codes in the file.
+            /// CRC-32 of the bytes that hold the samples in the file.
             bytes_crc: u32 = "bytes_crc32 INTEGER NOT NULL",
+            /// The type of each channel.
+            sample_types: SampleTypes = "sample_types TEXT",
             "seal INTEGER NOT NULL",
             "samples BLOB NOT NULL",
         }
@@ -90,10 +93,8 @@ pub struct NewLevel {
     pub epoch: u32,
     /// Scan index of its first sample.
     pub first_scan: u64,
-    /// Number of channels.
-    pub channels: usize,
-    /// Raw codes, channel after channel.
-    pub codes: Vec<i16>,
+    /// The samples of each channel.
+    pub samples: Samples,
     /// Missing samples, as index ranges.
     pub gaps: Vec<Range<usize>>,
 }
@@ -151,11 +152,12 @@ impl NewLevel {
             drive_v,
             epoch: self.epoch,
             first_scan: self.first_scan,
-            scans: self.codes.len().checked_div(self.channels).unwrap_or(0),
-            channels: self.channels,
+            scans: self.samples.scans(),
+            channels: self.samples.channels(),
             gaps: self.gaps.clone(),
             crc,
             bytes_crc,
+            sample_types: SampleTypes::of(&self.samples),
         }
     }
 }
@@ -163,14 +165,14 @@ impl NewLevel {
 impl Store {
     /// Stores one level permanently; returns its id.
     pub fn insert_level(&self, new: &NewLevel) -> Result<i64, StoreError> {
-        let bytes = codec::encode(&new.codes, new.channels)
-            .map_err(|error| self.content(format!("a level could not be compressed: {error}")))?;
-        let (crc, bytes_crc) = (codec::checksum(&new.codes), crc32fast::hash(&bytes));
+        let bytes = codec::encode(&new.samples)
+            .map_err(|error| self.content(format!("a level cannot be stored: {error}")))?;
+        let (crc, bytes_crc) = (codec::checksum(&new.samples), crc32fast::hash(&bytes));
         self.change("storing a level", |connection| {
             let id: i64 =
                 connection.query_row("SELECT coalesce(max(id), 0) + 1 FROM levels", [], |row| row.get(0))?;
             let values = new.row(id, crc, bytes_crc).into_values()?;
-            let seal = row_seal::of(&values);
+            let seal = row_seal::of::<LevelRow>(&values);
             insert::<LevelRow>(connection, "levels", &values, &[("seal", &seal), ("samples", &bytes)])?;
             Ok(id)
         })
@@ -178,7 +180,8 @@ impl Store {
 
     /// Every level without its samples, in order of measurement.
     pub fn levels(&self) -> Result<Vec<Result<LevelRow, DamagedLevel>>, StoreError> {
-        let sql = format!("SELECT {}, seal FROM levels ORDER BY id", LevelRow::list());
+        let list = LevelRow::list_in(&self.connection).map_err(self.failed("reading the shaker's levels"))?;
+        let sql = format!("SELECT {list}, seal FROM levels ORDER BY id");
         let read = |row: &rusqlite::Row<'_>| {
             let id = row.get(0)?;
             Ok(row_seal::read(row)?.map_err(|what| DamagedLevel { id, what }))
@@ -201,8 +204,8 @@ impl Store {
         if found != row.bytes_crc {
             return Err(damaged(CodecError::Bytes { found, stored: row.bytes_crc }));
         }
-        let codes = codec::decode(&bytes, row.channels, row.scans, row.crc).map_err(damaged)?;
-        Ok(Samples { codes, channels: row.channels })
+        let types = row.sample_types.each(row.channels).map_err(damaged)?;
+        codec::decode(&bytes, &types, row.scans, row.crc).map_err(damaged)
     }
 }
 

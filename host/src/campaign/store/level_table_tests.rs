@@ -5,6 +5,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::store::table::Column;
 use crate::device::channels::ChannelMap;
+use crate::device::samples::Samples;
 
 fn session(store: &mut Store) -> i64 {
     let text = || "x".to_owned();
@@ -22,6 +23,7 @@ fn session(store: &mut Store) -> i64 {
 }
 
 fn level(session: i64, moment: Moment, end_hz: Option<f64>) -> NewLevel {
+    let codes: Vec<i16> = (0..4_000_i32).map(|i| (i * 31 % 2_000 - 1_000) as i16).collect();
     NewLevel {
         session,
         moment,
@@ -29,8 +31,7 @@ fn level(session: i64, moment: Moment, end_hz: Option<f64>) -> NewLevel {
         settled: Settled { reached: 1.49e-7, overshoot: 1.04, after_s: 3.2, drive_v: 0.4 },
         epoch: 3,
         first_scan: 144_000,
-        channels: 2,
-        codes: (0..4_000_i32).map(|i| (i * 31 % 2_000 - 1_000) as i16).collect(),
+        samples: Samples::of_codes(&codes, 2),
         gaps: vec![],
     }
 }
@@ -53,7 +54,7 @@ fn a_level_comes_back_as_it_was_stored() {
         let row = row.as_ref().expect("whole");
         assert!(row.whole(), "{row:?}");
         assert_eq!((row.level(), row.settled(), row.moment), (new.level, new.settled, new.moment));
-        assert_eq!(store.level_samples(row).expect("whole").codes, new.codes);
+        assert_eq!(store.level_samples(row).expect("whole"), new.samples);
     }
     assert!(store.verify().expect("verified").is_empty());
 }
@@ -91,7 +92,7 @@ fn every_column_of_a_level_is_under_its_seal() {
     store.insert_level(&level(id, Moment::Before, None)).expect("stored");
     let before = store.levels().expect("read");
     store.connection.execute_batch("DROP TRIGGER levels_stay; PRAGMA foreign_keys = OFF").expect("changed");
-    assert_eq!(LevelRow::columns().count(), 19);
+    assert_eq!(LevelRow::columns().count(), 20);
     for name in LevelRow::columns().map(Column::name) {
         store
             .connection

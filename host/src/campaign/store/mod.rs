@@ -67,14 +67,16 @@ pub mod session_table;
 pub mod stored;
 mod table;
 pub mod verify;
+#[cfg(test)]
+mod wide_samples_tests;
 
 /// Identifies a campaign file (`JRIG`).
 const APPLICATION_ID: i32 = i32::from_be_bytes(*b"JRIG");
 
 /// Version of the tables (`schema.rs`), in SQLite's `user_version`.
-const VERSION: i32 = 2;
+const VERSION: i32 = 3;
 
-/// The oldest version that can be read: without the chain.
+/// The oldest version that can be read: without the chain. Version 2 has 16-bit codes only.
 const OLDEST: i32 = 1;
 
 /// How long to wait for another process's lock on the file.

@@ -8,10 +8,12 @@ use super::codec::CodecError;
 use super::error::StoreError;
 use super::notes::utc_now;
 use super::session_table::{Counters, write_link};
-use super::table::{Row, insert, table};
+use super::stored::SampleTypes;
+use super::table::{Row, SINCE_3, insert, table};
 use super::{Store, codec, row_seal};
 use crate::campaign::verdict::{Judgement, Verdict};
-use crate::device::stream::{Codes, Recording};
+use crate::device::samples::{ChannelView, SampleType, Samples};
+use crate::device::stream::Recording;
 use jointrig_protocol::shot::Shot;
 use rusqlite::Connection;
 use std::ops::Range;
@@ -23,15 +25,15 @@ impl Store {
     /// Stores one record permanently, together with the link's `counters` so far; returns its id.
     pub fn insert(&self, record: &NewRecord, counters: &Counters) -> Result<i64, StoreError> {
         let recording = &record.recording;
-        let bytes = codec::encode(&recording.codes, recording.channels)
-            .map_err(|error| self.content(format!("a record could not be compressed: {error}")))?;
-        let (crc, bytes_crc) = (codec::checksum(&recording.codes), crc32fast::hash(&bytes));
+        let bytes = codec::encode(&recording.samples)
+            .map_err(|error| self.content(format!("a record cannot be stored: {error}")))?;
+        let (crc, bytes_crc) = (codec::checksum(&recording.samples), crc32fast::hash(&bytes));
         self.change("storing a record", |connection| {
             // this is the only writer
             let id: i64 =
                 connection.query_row("SELECT coalesce(max(id), 0) + 1 FROM records", [], |row| row.get(0))?;
             let values = record.row(id, crc, bytes_crc).into_values()?;
-            let seal = row_seal::of(&values);
+            let seal = row_seal::of::<RecordRow>(&values);
             insert::<RecordRow>(connection, "records", &values, &[("samples", &bytes)])?;
             insert::<RecordRow>(connection, "seals", &values, &[("record", &id), ("seal", &seal)])?;
             write_link(connection, record.session, counters)?;
@@ -81,11 +83,12 @@ impl Store {
     }
 
     fn record_at(&self, place: Place) -> Result<RecordRow, Damaged> {
+        let list = RecordRow::list_in(&self.connection).map_err(self.failed("reading a record"));
+        let list = list.map_err(|error| Damaged { place, what: error.to_string() })?;
         let sql = format!(
-            "SELECT {}, seals.seal, \
+            "SELECT {list}, seals.seal, \
              (SELECT verdict FROM overrules WHERE record = records.id ORDER BY id DESC LIMIT 1) \
-             FROM records LEFT JOIN seals ON seals.record = records.id WHERE records.id = ?1",
-            RecordRow::list()
+             FROM records LEFT JOIN seals ON seals.record = records.id WHERE records.id = ?1"
         );
         let read = |row: &rusqlite::Row<'_>| {
             let overruled: Option<String> = row.get(RecordRow::columns().count() + 1)?;
@@ -111,9 +114,9 @@ impl Store {
     /// [`StoreError::Damaged`] names the record.
     pub fn samples(&self, record: &RecordRow) -> Result<Samples, StoreError> {
         let damaged = |error: CodecError| self.damaged(record.id, error.to_string());
-        let decode = |bytes: &[u8]| codec::decode(bytes, record.channels, record.scans, record.crc);
-        let codes = self.with_checked_bytes(record, decode).map_err(damaged)?;
-        Ok(Samples { codes, channels: record.channels })
+        let types = record.sample_types.each(record.channels).map_err(damaged)?;
+        let decode = |bytes: &[u8]| codec::decode(bytes, &types, record.scans, record.crc);
+        self.with_checked_bytes(record, decode).map_err(damaged)
     }
 
     /// Passes the samples of some channels of one record to `look`, each with its index, in the
@@ -126,10 +129,12 @@ impl Store {
         &self,
         record: &RecordRow,
         places: &[usize],
-        look: impl FnMut(usize, &[i16]),
+        look: impl FnMut(usize, ChannelView<'_>),
     ) -> Result<(), StoreError> {
-        let decode = |bytes: &[u8]| codec::decode_each(bytes, record.channels, record.scans, places, look);
-        self.with_checked_bytes(record, decode).map_err(|error| self.damaged(record.id, error.to_string()))
+        let damaged = |error: CodecError| self.damaged(record.id, error.to_string());
+        let types = record.sample_types.each(record.channels).map_err(damaged)?;
+        let decode = |bytes: &[u8]| codec::decode_each(bytes, &types, record.scans, places, look);
+        self.with_checked_bytes(record, decode).map_err(damaged)
     }
 
     /// Runs `work` on a record's bytes without copying them.
@@ -141,7 +146,7 @@ impl Store {
         let read =
             self.connection.query_row("SELECT samples FROM records WHERE id = ?1", [record.id], |row| {
                 let bytes = row.get_ref(0)?.as_blob()?;
-                // a flipped padding bit of the compressor changes no code, but the file still
+                // a flipped padding bit of the compressor changes no sample, but the file still
                 // differs from what was stored
                 let (found, stored) = (crc32fast::hash(bytes), record.bytes_crc);
                 Ok(if found == stored { work(bytes) } else { Err(CodecError::Bytes { found, stored }) })
@@ -160,14 +165,33 @@ impl Store {
             .map_err(self.failed("reading samples"))
     }
 
-    /// Total size of all samples, bytes: as stored, and as raw codes.
+    /// Total size of all samples, bytes: as stored, and as they came.
     pub fn sample_bytes(&self) -> Result<(u64, u64), StoreError> {
-        let sql = "SELECT coalesce(sum(stored), 0), coalesce(sum(raw), 0) FROM \
-                   (SELECT length(samples) AS stored, 2 * scans * channels AS raw FROM records \
-                   UNION ALL SELECT length(samples), 2 * scans * channels FROM levels)";
-        self.connection
-            .query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?)))
-            .map_err(self.failed("measuring the file"))
+        let measure = || {
+            let (mut stored, mut raw) = (0_u64, 0_u64);
+            // a damaged row may claim anything
+            let count = |row: &rusqlite::Row<'_>, place: usize| -> rusqlite::Result<u64> {
+                Ok(u64::try_from(row.get::<_, i64>(place)?).unwrap_or(0))
+            };
+            for (table, of) in [("seals", "records LEFT JOIN seals ON record = id"), ("levels", "levels")] {
+                let there = self.connection.column_exists(None, table, SINCE_3)?;
+                let types = if there { SINCE_3 } else { "NULL" };
+                let sql = format!("SELECT length(samples), scans, channels, {types} FROM {of}");
+                let mut statement = self.connection.prepare_cached(&sql)?;
+                let mut rows = statement.query([])?;
+                while let Some(row) = rows.next()? {
+                    let (size, scans, channels) = (count(row, 0)?, count(row, 1)?, count(row, 2)?);
+                    let names: Option<String> = row.get(3)?;
+                    let scan = names.map_or(channels.saturating_mul(2), |names| {
+                        names.split(' ').filter_map(SampleType::named).map(|of| of.bytes() as u64).sum()
+                    });
+                    stored = stored.saturating_add(size);
+                    raw = raw.saturating_add(scan.saturating_mul(scans));
+                }
+            }
+            Ok((stored, raw))
+        };
+        measure().map_err(self.failed("measuring the file"))
     }
 }
 
@@ -213,22 +237,25 @@ table! {
             limit: f64 = "limit_value REAL NOT NULL",
             /// Both as a sentence.
             sentence: String = "sentence TEXT NOT NULL",
-            /// CRC-32 of the raw codes.
+            /// CRC-32 of the raw samples.
             crc: u32 = "crc32 INTEGER NOT NULL",
             /// Always 0: the seal is in `seals`.
             reserved: i64 = "seal INTEGER NOT NULL",
             "samples BLOB NOT NULL",
             "UNIQUE (cell, attempt)",
         }
-        // stored with the record: results of judging it
+        // stored with the record: results of judging it, and the types of its samples (behind the
+        // samples in `records`, SQLite would read all of them to find these)
         "seals" {
             "record INTEGER PRIMARY KEY REFERENCES records(id)",
             /// Peak of the band-limited force, N; 0 without a pulse.
             peak_n: f64 = "peak_n REAL NOT NULL",
             /// Uncertainty of `utc`, ± s; `None` without a clock fit.
             utc_error_s: Option<f64> = "utc_error_s REAL",
-            /// CRC-32 of the bytes that hold the codes in the file.
+            /// CRC-32 of the bytes that hold the samples in the file.
             bytes_crc: u32 = "bytes_crc32 INTEGER NOT NULL",
+            /// The type of each channel.
+            sample_types: SampleTypes = "sample_types TEXT",
             "seal INTEGER NOT NULL",
         }
     }
@@ -295,10 +322,10 @@ pub struct NewRecord {
 }
 
 impl NewRecord {
-    /// The row to be stored with `id`; `crc` is that of its codes, `bytes_crc` that of the bytes
+    /// The row to be stored with `id`; `crc` is that of its samples, `bytes_crc` that of the bytes
     /// that hold them.
     pub(super) fn row(&self, id: i64, crc: u32, bytes_crc: u32) -> RecordRow {
-        let Recording { epoch, first_scan, trigger_index, channels, shot, gaps, .. } = &self.recording;
+        let Recording { epoch, first_scan, trigger_index, samples, shot, gaps } = &self.recording;
         RecordRow {
             id,
             cell: self.cell,
@@ -308,8 +335,8 @@ impl NewRecord {
             epoch: *epoch,
             first_scan: *first_scan,
             trigger_index: *trigger_index,
-            scans: self.recording.scans(),
-            channels: *channels,
+            scans: samples.scans(),
+            channels: samples.channels(),
             pulse_us: shot.pulse_us,
             device_peak_n: shot.peak_n.into(),
             shot: *shot,
@@ -323,29 +350,9 @@ impl NewRecord {
             peak_n: self.verdict.peak_n,
             utc_error_s: self.utc_error_s,
             bytes_crc,
+            sample_types: SampleTypes::of(samples),
             overruled: None,
         }
-    }
-}
-
-/// The samples of a stored record.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Samples {
-    /// Raw codes, channel after channel.
-    pub codes: Vec<i16>,
-    /// Number of channels.
-    pub channels: usize,
-}
-
-impl Samples {
-    /// A borrowed view.
-    pub fn view(&self) -> Codes<'_> {
-        Codes { codes: &self.codes, channels: self.channels }
-    }
-
-    /// The raw codes of one channel; empty for an index beyond the last one.
-    pub fn channel(&self, place: usize) -> &[i16] {
-        self.view().channel(place)
     }
 }
 

@@ -4,17 +4,17 @@
 //! It runs over the columns in the order of the table ([`super::table`]); for a record over those
 //! of `records` and then of `seals`. Each value contributes its type (0 null, 1 integer, 2 real, 3
 //! text, 4 bytes), then eight bytes little-endian (the integer, the real's bits, or the length),
-//! then the text or bytes themselves. For the samples these columns contain separate checksums: one
-//! over the codes, one over the bytes as they are stored.
-//! the bytes as they are stored.
+//! then the text or bytes themselves. A null in a column that older files lack contributes nothing.
+//! For the samples these columns contain separate checksums: one over the samples, one over the
+//! bytes as they are stored.
 
 use rusqlite::types::{Value, ValueRef};
 
-use super::table::Row;
+use super::table::{Row, SINCE_3};
 
 /// The seal of values that are to be stored.
-pub(super) fn of(values: &[Value]) -> u32 {
-    over(values.iter().map(ValueRef::from))
+pub(super) fn of<R: Row>(values: &[Value]) -> u32 {
+    over::<R>(values.iter().map(ValueRef::from))
 }
 
 /// Reads a row that is followed by its seal; an error message if the seal does not match.
@@ -24,19 +24,26 @@ pub(super) fn read<R: Row>(row: &rusqlite::Row<'_>) -> rusqlite::Result<Result<R
         return Ok(Err("its seal is missing".into()));
     };
     let values = (0..columns).map(|place| row.get_ref(place)).collect::<rusqlite::Result<Vec<_>>>()?;
-    if over(values.into_iter()) == stored {
+    if over::<R>(values.into_iter()) == stored {
         R::read(row).map(Ok)
     } else {
         Ok(Err("its description was changed".into()))
     }
 }
 
-fn over<'v>(values: impl Iterator<Item = ValueRef<'v>>) -> u32 {
+fn over<'v, R: Row>(values: impl Iterator<Item = ValueRef<'v>>) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
-    for value in values {
-        each(value, |bytes| hasher.update(bytes));
+    for (column, value) in R::columns().zip(values) {
+        if counts(column.name(), value) {
+            each(value, |bytes| hasher.update(bytes));
+        }
     }
     hasher.finalize()
+}
+
+/// Whether a column's value is part of a seal or digest.
+pub(super) fn counts(column: &str, value: ValueRef<'_>) -> bool {
+    column != SINCE_3 || value != ValueRef::Null
 }
 
 /// Passes type, number and bytes of a value to `take`, in that order.

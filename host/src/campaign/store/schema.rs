@@ -22,7 +22,7 @@ use super::record_table::Overrule;
 use super::record_table::RecordRow;
 use super::session_table::TemperatureRow;
 use super::session_table::{ChannelColumns, Sensor, SessionInfo};
-use super::table::create;
+use super::table::{SINCE_3, create};
 use super::{APPLICATION_ID, Store, VERSION, chain, session_table};
 use crate::campaign::plan::Plan;
 use rusqlite::Connection;
@@ -46,6 +46,9 @@ const APPEND_ONLY: [(&str, &str); 6] = [
     ("calibrations", "a calibration is"),
     ("chain", "an entry of the chain is"),
 ];
+
+/// Tables that name the types of samples.
+const TYPED: [&str; 2] = ["seals", "levels"];
 
 impl Store {
     /// Creates a campaign file for the plan in `text`, which errors call `source`.
@@ -75,23 +78,32 @@ impl Store {
         transaction.commit()
     }
 
-    /// Migrates an older file: since version 2 every row is chained.
+    /// Migrates an older file: since version 2 every row is chained, since version 3 a record names
+    /// the types of its samples.
     pub(super) fn bring_up(&self) -> rusqlite::Result<()> {
         let version: i32 = self.connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
         if version == VERSION {
             return Ok(());
         }
         let transaction = self.connection.unchecked_transaction()?;
-        transaction.execute_batch(&missing_calibrations(&transaction)?)?;
-        if !transaction.table_exists(None, "temperatures")? {
-            transaction.execute_batch(&create::<TemperatureRow>())?;
+        for table in TYPED {
+            // the rows stay as they are, and null there counts for nothing in their seals
+            if !transaction.column_exists(None, table, SINCE_3)? {
+                transaction.execute_batch(&format!("ALTER TABLE {table} ADD COLUMN {SINCE_3} TEXT"))?;
+            }
         }
-        transaction.execute_batch(&(chain::TABLES.to_owned() + &stay(APPEND_ONLY[5])))?;
-        write_log(
-            &transaction,
-            "rows are chained from here on; earlier changes show only in the records' seals",
-        )?;
-        chain::begin(&transaction)?;
+        if version == super::OLDEST {
+            transaction.execute_batch(&missing_calibrations(&transaction)?)?;
+            if !transaction.table_exists(None, "temperatures")? {
+                transaction.execute_batch(&create::<TemperatureRow>())?;
+            }
+            transaction.execute_batch(&(chain::TABLES.to_owned() + &stay(APPEND_ONLY[5])))?;
+            write_log(
+                &transaction,
+                "rows are chained from here on; earlier changes show only in the records' seals",
+            )?;
+            chain::begin(&transaction)?;
+        }
         transaction.pragma_update(None, "user_version", VERSION)?;
         transaction.commit()
     }
@@ -164,6 +176,16 @@ fn ours() -> rusqlite::Result<&'static Objects> {
     Ok(OURS.get_or_init(|| made))
 }
 
+/// Whether an object is as jointrig makes it. A table may lack the column of the samples' types
+/// (version 2), or have it at its end, where ALTER TABLE put it.
+fn as_made(made: &str, found: &str) -> bool {
+    let without = |sql: &str| {
+        let dense: String = sql.split_whitespace().collect();
+        dense.replacen(&format!(",{SINCE_3}TEXT"), "", 1)
+    };
+    made == found || (made.contains(SINCE_3) && without(made) == without(found))
+}
+
 /// An object of the schema that jointrig does not create, or creates differently; `None` if there
 /// is none.
 ///
@@ -183,7 +205,7 @@ pub(super) fn strange(connection: &Connection) -> rusqlite::Result<Option<String
                     kind.to_uppercase()
                 )));
             }
-            Some((own, made)) if own != kind || made != sql => {
+            Some((own, made)) if own != kind || !as_made(made, sql) => {
                 return Ok(Some(format!(
                     "its {kind} `{name}` is not as jointrig makes it: use a backup from before it was changed"
                 )));
@@ -208,6 +230,13 @@ pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<String>> 
     names.retain(|name| version > super::OLDEST || !later(name));
     // created on demand
     names.retain(|name| !["clocks", "edges"].contains(&name.as_str()));
+    if version >= 3 {
+        for table in TYPED.into_iter().filter(|table| found.contains_key(*table)) {
+            if !connection.column_exists(None, table, SINCE_3)? {
+                names.push(format!("{table}.{SINCE_3}"));
+            }
+        }
+    }
     names.sort();
     Ok(names)
 }

@@ -6,6 +6,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::verdict::Judgement;
 use crate::device::channels::ChannelMap;
+use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::channel::{Quantity, Role};
@@ -58,13 +59,13 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
         friction_peak_n: 17.0,
         quiet_ratio: 0.3,
     };
-    let codes = (0..4_000_i32).map(|i| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16).collect();
+    let codes: Vec<i16> =
+        (0..4_000_i32).map(|i| ((i * 31 + attempt.cast_signed()) % 2_000 - 1_000) as i16).collect();
     let recording = Recording {
         epoch: 3,
         first_scan: 144,
         trigger_index: 256,
-        channels: 2,
-        codes,
+        samples: Samples::of_codes(&codes, 2),
         gaps: vec![3..7, 9..10],
         shot,
     };
@@ -96,7 +97,7 @@ fn records_come_back_bit_for_bit_and_can_be_read_while_another_writes() {
     assert_eq!(reader.sessions().expect("sessions"), [(session, info())]);
     for (row, attempt) in stored.iter().zip(0..) {
         let new = record(cells[0].id, attempt, session, row.verdict).recording;
-        assert_eq!(reader.samples(row).expect("samples").codes, new.codes);
+        assert_eq!(reader.samples(row).expect("samples"), new.samples);
         assert_eq!((row.shot, &row.gaps, row.first_scan), (new.shot, &new.gaps, 144));
     }
     store.overrule(stored[1].id, Verdict::Good, "looked at it").expect("overruled");
@@ -192,7 +193,7 @@ fn every_column_of_a_record_is_under_its_seal() {
     let vandals = "DROP TRIGGER records_stay; DROP TRIGGER seals_stay; PRAGMA foreign_keys = OFF";
     store.connection.execute_batch(vandals).expect("changed");
     let columns: Vec<_> = RecordRow::columns().filter(|column| column.name() != "id").collect();
-    assert_eq!(columns.len(), 22);
+    assert_eq!(columns.len(), 23);
     for column in columns {
         let (table, name) = (column.table, column.name());
         store

@@ -8,6 +8,10 @@
 use rusqlite::types::{FromSql, ToSql, Value, ValueRef};
 use rusqlite::{Connection, params_from_iter};
 
+/// The column that tables of samples have since version 3 of the file. Older tables lack it; a null
+/// in it is the same as its absence, and contributes nothing to a row's seal or digest.
+pub(super) const SINCE_3: &str = "sample_types";
+
 /// A column of a table, or a constraint.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
@@ -47,6 +51,16 @@ pub trait Row: Sized {
         let names: Vec<String> =
             Self::columns().map(|column| format!("{}.{}", column.table, column.name())).collect();
         names.join(", ")
+    }
+
+    /// As [`Row::list`], with null for a column that this file's table lacks.
+    fn list_in(connection: &Connection) -> rusqlite::Result<String> {
+        let name = |column: &Column| {
+            let (table, name) = (column.table, column.name());
+            let there = name != SINCE_3 || connection.column_exists(None, table, name)?;
+            Ok(if there { format!("{table}.{name}") } else { format!("NULL AS {name}") })
+        };
+        Ok(Self::columns().map(name).collect::<rusqlite::Result<Vec<String>>>()?.join(", "))
     }
 
     /// Stores it in its only table, with the additional columns `beside` that the type does not

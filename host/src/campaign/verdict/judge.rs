@@ -5,7 +5,7 @@ use super::{Judgement, Limits, RawHit, Verdict};
 use crate::campaign::plan::{Cell, Plan};
 use crate::device::channels::ChannelMap;
 use crate::device::stream::Recording;
-use jointrig_protocol::channel::{Channel, Quantity, Role};
+use jointrig_protocol::channel::{Quantity, Role};
 
 /// Judges records. It works on the raw record, before anything is derived from it.
 pub trait Judge {
@@ -35,10 +35,7 @@ impl Judge for ByRecord {
         recording: &Recording,
         others: &Others,
     ) -> Judgement {
-        let si = |place: usize| -> Vec<f64> {
-            let unit = channels.channels.get(place).map_or(f64::NAN, Channel::units_per_code);
-            recording.channel(place).iter().map(|code| f64::from(*code) * unit).collect()
-        };
+        let si = |place: usize| channels.to_si(place, recording.channel(place));
         let force_n = channels.place(Role::HammerForce).map(si).unwrap_or_default();
         let places = channels.channels.iter().enumerate().filter(|(_, channel)| is_motion(channel.quantity));
         let (names, responses): (Vec<&str>, Vec<Vec<f64>>) =
@@ -50,7 +47,9 @@ impl Judge for ByRecord {
             rebound_after_s: given.rebound_after_s,
             weak_fraction: given.weak_n / wanted.target_n,
             strong_fraction: given.strong_n / wanted.target_n,
-            force_range_n: channels.place(Role::HammerForce).map(|place| range(&channels.channels[place])),
+            force_range_n: channels
+                .place(Role::HammerForce)
+                .and_then(|place| recording.channel(place).of().full_scale(&channels.channels[place])),
             response_range: None,
             expected_start_s: Some(recording.trigger_index as f64 / channels.fs_hz()),
             ..Limits::default()
@@ -66,7 +65,7 @@ impl Judge for ByRecord {
         let judged =
             |kind, measure, limit, sentence| Judgement { kind, measure, limit, sentence, ..found.clone() };
         // a channel at the end of its converter's range spoils the record whatever the hammer did;
-        // ranges differ between channels, so each is checked in its own codes
+        // ranges differ between channels, so each is checked in its own codes, where it has codes
         if missing == 0
             && let Some((name, touched)) = over_range(channels, recording)
         {
@@ -99,7 +98,7 @@ fn noisier<'a>(
     others: &Others,
     limit: f64,
 ) -> Option<(&'a str, f64)> {
-    let noise = others::channel_noise(channels, recording.view());
+    let noise = others::channel_noise(channels, &recording.samples);
     let ratios = channels.channels.iter().zip(noise).enumerate().filter_map(|(place, (channel, noise))| {
         let usual = others.usual_noise(place).filter(|usual| *usual > 0.0)?;
         Some((channel.name.as_str(), noise / usual))
@@ -112,17 +111,11 @@ fn is_motion(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Velocity | Quantity::Acceleration | Quantity::Displacement)
 }
 
-/// Full scale of a channel in its unit.
-fn range(channel: &Channel) -> f64 {
-    f64::from(channel.range_v) * f64::from(channel.units_per_volt).abs()
-}
-
 /// The first channel with more than one code at an end of its range, and their number. A single one
 /// may be chance.
 fn over_range<'a>(channels: &'a ChannelMap, recording: &Recording) -> Option<(&'a str, usize)> {
     channels.channels.iter().enumerate().find_map(|(place, channel)| {
-        let extreme = |code: &&i16| **code == i16::MAX || **code == i16::MIN;
-        let touched = recording.channel(place).iter().filter(extreme).count();
+        let touched = recording.channel(place).at_the_ends(channel.bits);
         (touched > 1).then_some((channel.name.as_str(), touched))
     })
 }

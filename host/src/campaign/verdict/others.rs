@@ -5,7 +5,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 
 use crate::campaign::plan::{Enough, Plan};
 use crate::device::channels::ChannelMap;
-use crate::device::stream::Codes;
+use crate::device::samples::{ChannelView, Samples};
 use crate::spectra::{CrossSpectra, Pulse, Summing, Windowing};
 
 /// Number of good records needed for a usual noise.
@@ -33,10 +33,10 @@ impl Others {
     }
 
     /// Adds a good record. The FRFs are tracked only if the plan defines when they are good enough.
-    pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, codes: Codes<'_>) {
-        self.noise.push(channel_noise(channels, codes));
+    pub fn learn(&mut self, plan: &Plan, channels: &ChannelMap, samples: &Samples) {
+        self.noise.push(channel_noise(channels, samples));
         if let Some(enough) = &plan.enough {
-            self.add_to_sums(plan, enough.get_ref(), channels, codes);
+            self.add_to_sums(plan, enough.get_ref(), channels, samples);
         }
     }
 
@@ -70,10 +70,10 @@ impl Others {
         (power > 0.0).then(|| (variance / power).sqrt())
     }
 
-    fn add_to_sums(&mut self, plan: &Plan, enough: &Enough, channels: &ChannelMap, codes: Codes<'_>) {
+    fn add_to_sums(&mut self, plan: &Plan, enough: &Enough, channels: &ChannelMap, samples: &Samples) {
         let Some(force) = channels.place(Role::HammerForce) else { return };
         let fs_hz = channels.fs_hz();
-        let si = |place: usize| channels.to_si(place, codes.channel(place));
+        let si = |place: usize| channels.to_si(place, samples.channel(place));
         let force_n = si(force);
         let Some(pulse) = Pulse::locate(&force_n) else { return };
         let window =
@@ -91,10 +91,11 @@ impl Others {
 
 /// Noise of every channel in its unit; 0 for channels that measure neither velocity nor
 /// acceleration.
-pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
+pub fn channel_noise(channels: &ChannelMap, samples: &Samples) -> Vec<f64> {
     let of = |(place, channel): (usize, &jointrig_protocol::channel::Channel)| {
         if matches!(channel.quantity, Quantity::Velocity | Quantity::Acceleration) {
-            noise_codes(codes.channel(place)) * channel.units_per_code().abs()
+            let own = samples.channel(place);
+            noise(own) * own.of().units(channel).abs()
         } else {
             0.0
         }
@@ -102,24 +103,32 @@ pub fn channel_noise(channels: &ChannelMap, codes: Codes<'_>) -> Vec<f64> {
     channels.channels.iter().enumerate().map(of).collect()
 }
 
-/// Rms of the broadband noise, codes: third differences (which remove smooth motion) over the
-/// second half of the record, where the motion has decayed; the median over blocks, so that a
-/// single spike, which has a separate check, does not count.
-fn noise_codes(codes: &[i16]) -> f64 {
-    let late = &codes[codes.len() / 2..];
-    // third differences of white noise have 1 + 9 + 9 + 1 times its power
-    let squared = |w: &[i16]| {
-        let [a, b, c, d] = [w[0], w[1], w[2], w[3]].map(f64::from);
-        (a - 3.0 * b + 3.0 * c - d).powi(2) / 20.0
+/// Rms of the broadband noise, in units of the samples: third differences (which remove smooth
+/// motion) over the second half of the record, where the motion has decayed; the median over
+/// blocks, so that a single spike, which has a separate check, does not count. Never below what
+/// can be measured: rounding for codes, and for other values the rounding of a 16-bit converter
+/// with the record's largest value as its full scale, because less changes no result, and would
+/// be compared with nothing in records without noise.
+fn noise(samples: ChannelView<'_>) -> f64 {
+    let mut late = Vec::new();
+    samples.part(samples.len() / 2, samples.len()).scaled(1.0, &mut late);
+    let floor = if samples.of().is_code() {
+        ROUNDING
+    } else {
+        let mut all = Vec::new();
+        samples.scaled(1.0, &mut all);
+        ROUNDING * all.iter().fold(0.0f64, |most, v| most.max(v.abs())) / 32_768.0
     };
+    // third differences of white noise have 1 + 9 + 9 + 1 times its power
+    let squared = |w: &[f64]| (w[0] - 3.0 * w[1] + 3.0 * w[2] - w[3]).powi(2) / 20.0;
     let blocks = late.len().saturating_sub(3) / BLOCK;
     let of_block = |n: usize| late[n * BLOCK..(n + 1) * BLOCK + 3].windows(4).map(squared).sum::<f64>();
     let mut power: Vec<f64> = (0..blocks).map(|n| of_block(n) / BLOCK as f64).collect();
     let middle = power.len() / 2;
     if power.is_empty() {
-        return ROUNDING;
+        return floor;
     }
-    power.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt().max(ROUNDING)
+    power.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt().max(floor)
 }
 
 #[cfg(test)]
@@ -137,9 +146,24 @@ mod tests {
         let codes: Vec<i16> = (0..20_000)
             .map(|i| (3_000.0 * (f64::from(i) * 0.02).sin() + 34.64 * dice()).round() as i16)
             .collect();
-        let found = noise_codes(&codes);
-        assert!((found / 10.0 - 1.0).abs() < 0.05, "{found}");
-        assert_eq!(noise_codes(&[0; 1_000]), ROUNDING);
-        assert_eq!(noise_codes(&[]), ROUNDING);
+        let wide: Vec<i32> = codes.iter().map(|code| 256 * i32::from(*code)).collect();
+        let single: Vec<f32> = codes.iter().map(|code| f32::from(*code) / 1024.0).collect();
+        let double: Vec<f64> = codes.iter().map(|code| f64::from(*code) / 1e9).collect();
+        for (found, rms) in [
+            (noise(ChannelView::I16(&codes)), 10.0),
+            (noise(ChannelView::I32(&wide)), 2560.0),
+            (noise(ChannelView::F32(&single)), 10.0 / 1024.0),
+            (noise(ChannelView::F64(&double)), 1e-8),
+        ] {
+            assert!((found / rms - 1.0).abs() < 0.05, "{found} for {rms}");
+        }
+        assert_eq!(noise(ChannelView::I16(&[0; 1_000])), ROUNDING);
+        assert_eq!(noise(ChannelView::I16(&[])), ROUNDING);
+        assert_eq!(noise(ChannelView::I32(&[0; 1_000])), ROUNDING);
+        // without noise and without codes, nothing below a 16-bit converter's rounding counts
+        let quiet: Vec<f64> = (0..20_000).map(|i| 1e-3 * (-1e-3 * f64::from(i)).exp()).collect();
+        let found = noise(ChannelView::F64(&quiet));
+        assert!((found / (1e-3 * ROUNDING / 32_768.0) - 1.0).abs() < 1e-3, "{found}");
+        assert_eq!(noise(ChannelView::F64(&[0.0; 1_000])), 0.0);
     }
 }

@@ -1,7 +1,15 @@
 //! Verdicts on synthetic hits: a ringing force cell, noise, a 16-bit converter, rebounds of various
 //! sizes and delays.
 
+use super::judge::{ByRecord, Judge};
+use super::others::Others;
 use super::*;
+use crate::campaign::plan::{Plan, SMALL};
+use crate::device::channels::ChannelMap;
+use crate::device::samples::{ChannelSamples, SampleType, Samples};
+use crate::device::stream::Recording;
+use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
+use jointrig_protocol::shot::{Phase, Shot};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use std::f64::consts::{PI, TAU};
@@ -334,5 +342,143 @@ fn a_soft_pulse_is_one_hit_at_any_rate() {
                 assert_eq!(found.kind, Verdict::Good, "{fs_hz} Hz, {width_s} s: {found:?}");
             }
         }
+    }
+}
+
+/// These signals (force first, then velocities) as a record of one type; integer types have these
+/// full scales and 24 bits.
+fn typed(of: SampleType, signals: &[Vec<f64>], full: &[f64]) -> (ChannelMap, Recording) {
+    let code = of.is_code();
+    let channel = |(place, full): (usize, &f64)| Channel {
+        name: ["force", "x", "y", "z"][place].try_into().expect("short"),
+        role: [Role::HammerForce, Role::Response(Axis::X), Role::Response(Axis::Y), Role::Response(Axis::Z)]
+            [place],
+        quantity: if place == 0 { Quantity::Force } else { Quantity::Velocity },
+        units_per_volt: if code { (full / 10.0) as f32 } else { 1.0 },
+        range_v: if code { 10.0 } else { 0.0 },
+        delay_ns: 0,
+        bits: if code { 24 } else { 0 },
+    };
+    let channels: Vec<Channel> = full.iter().enumerate().map(channel).collect();
+    let channels = ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels };
+    let samples = signals.iter().enumerate().map(|(place, own)| {
+        let codes = own.iter().map(|v| (v / of.units(&channels.channels[place])).round());
+        match of {
+            SampleType::I16 => ChannelSamples::I16(codes.map(|v| v as i16).collect()),
+            SampleType::I32 => {
+                ChannelSamples::I32(codes.map(|v| v.clamp(-8_388_608.0, 8_388_607.0) as i32).collect())
+            }
+            SampleType::F32 => ChannelSamples::F32(own.iter().map(|v| *v as f32).collect()),
+            SampleType::F64 => ChannelSamples::F64(own.clone()),
+        }
+    });
+    let samples = Samples::new(samples.collect()).expect("equally long");
+    let shot = Shot {
+        number: 1,
+        phase: Phase::Done,
+        fired_at: 0,
+        trigger: 512,
+        pulse_us: 3_000,
+        peak_n: 50.0,
+        width_us: 410.0,
+        rebound_ratio: 0.0,
+        rebound_after: 0,
+        friction_peak_n: 0.0,
+        quiet_ratio: 0.0,
+    };
+    (channels, Recording { epoch: 0, first_scan: 0, trigger_index: 512, samples, gaps: Vec::new(), shot })
+}
+
+fn by_record((channels, recording): &(ChannelMap, Recording), others: &Others) -> Judgement {
+    let plan = Plan::parse(SMALL, "small").expect("a plan");
+    ByRecord.judge(&plan.cells()[0], &plan, channels, recording, others)
+}
+
+/// A clean hit of 50 N without any noise: the force, a velocity, a one-sided motion that is exactly
+/// zero before the hit, and a channel that is zero throughout.
+fn noise_free(f0_hz: f64) -> Vec<Vec<f64>> {
+    let [force, v, _] = hann_hit(FS, 16_384, 512.3 / FS, 1.2e-3, f0_hz);
+    let force = force.iter().map(|f| 2.0 * f).collect();
+    let squared = v.iter().map(|v| v * v).collect();
+    vec![force, v, squared, vec![0.0; 16_384]]
+}
+
+fn most(x: &[f64]) -> f64 {
+    x.iter().fold(0.0f64, |most, v| most.max(v.abs()))
+}
+
+#[test]
+fn clean_records_without_noise_are_good_in_every_type() {
+    for of in SampleType::ALL {
+        for f0_hz in [3.0, 30.0, 90.0, 250.0, 700.0] {
+            let signals = noise_free(f0_hz);
+            let full: Vec<f64> = signals.iter().map(|x| 1.2 * most(x).max(1e-3)).collect();
+            let typed = typed(of, &signals, &full);
+            let mut others = Others::of(Vec::new());
+            let plan = Plan::parse(SMALL, "small").expect("a plan");
+            for hit in 0..5 {
+                let found = by_record(&typed, &others);
+                assert_eq!(found.kind, Verdict::Good, "{of:?}, {f0_hz} Hz, hit {hit}: {found:?}");
+                others.learn(&plan, &typed.0, &typed.1.samples);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_integer_channel_at_the_end_of_its_range_is_an_overload() {
+    let signals = noise_free(250.0);
+    for place in 0..3 {
+        let mut full: Vec<f64> = signals.iter().map(|x| 1.2 * most(x).max(1e-3)).collect();
+        // the largest values reach the extreme code of 24 bits, and stay there
+        full[place] = 0.98 * most(&signals[place]);
+        let found = by_record(&typed(SampleType::I32, &signals, &full), &Others::of(Vec::new()));
+        assert_eq!(found.kind, Verdict::Overload, "channel {place}: {found:?}");
+        assert!(found.sentence.contains("end of its range"), "{found:?}");
+    }
+    // 24-bit codes are far from the ends of 32 bits
+    let (mut map, recording) = typed(SampleType::I32, &signals, &[49.0, 1.0, 1.0, 1.0]);
+    assert!(recording.channel(0).at_the_ends(24) > 1);
+    assert_eq!(recording.channel(0).at_the_ends(32), 0);
+    map.channels[0].bits = 32;
+    assert!(recording.channel(0).at_the_ends(map.channels[0].bits) == 0);
+}
+
+#[test]
+fn a_clipped_channel_of_unknown_range_is_an_overload_by_its_plateaus() {
+    for of in [SampleType::F32, SampleType::F64] {
+        for place in [0, 1] {
+            for part in [0.6, 0.8, 0.9] {
+                let mut signals = noise_free(250.0);
+                let limit = part * most(&signals[place]);
+                signals[place].iter_mut().for_each(|v| *v = v.clamp(-limit, limit));
+                let found = by_record(&typed(of, &signals, &[1.0; 4]), &Others::of(Vec::new()));
+                assert_eq!(found.kind, Verdict::Overload, "{of:?}, channel {place}, {part}: {found:?}");
+                assert!((found.measure.abs() / limit - 1.0).abs() < 1e-6, "{found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_is_compared_in_every_type() {
+    let mut dice = Dice::new();
+    let plan = Plan::parse(SMALL, "small").expect("a plan");
+    for of in SampleType::ALL {
+        let mut hit = |noise: f64| {
+            let mut signals = noise_free(250.0);
+            let rms = noise * most(&signals[1]);
+            signals[1].iter_mut().for_each(|v| *v += rms * dice.gauss());
+            let full: Vec<f64> = signals.iter().map(|x| 1.2 * most(x).max(1e-3)).collect();
+            typed(of, &signals, &full)
+        };
+        let mut others = Others::of(Vec::new());
+        for _ in 0..4 {
+            let typed = hit(1e-4);
+            assert_eq!(by_record(&typed, &others).kind, Verdict::Good, "{of:?}");
+            others.learn(&plan, &typed.0, &typed.1.samples);
+        }
+        let found = by_record(&hit(1e-3), &others);
+        assert!(found.kind == Verdict::Noisy && found.sentence.contains("channel x is"), "{of:?}: {found:?}");
     }
 }

@@ -17,7 +17,7 @@ pub struct Verify {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Judge every record and measure every level again from the raw codes, and compare the results
+    /// Judge every record and measure every level again from the raw samples, and compare the results
     /// with the file.
     #[arg(long)]
     deep: bool,
@@ -61,7 +61,7 @@ fn deep(store: &Store) -> Result<(), CliError> {
     let (records, levels) = (found.records, found.levels);
     if found.different.is_empty() {
         let levels = if levels == 0 { String::new() } else { format!(" and {levels} levels") };
-        let told = format!("{path}: the verdicts of {records} records{levels} follow from their raw codes");
+        let told = format!("{path}: the verdicts of {records} records{levels} follow from their raw samples");
         return output::lines([told]);
     }
     let versions = found.other_version.map_or_else(String::new, |version| {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use jointrig_protocol::channel::Channel;
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -20,6 +21,7 @@ use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::cli::output::Waiting;
 use crate::device::channels::ChannelMap;
+use crate::device::samples::{ChannelView, SampleType};
 use crate::exchange::parquet::{ParquetFile, Stored, Values, Written, write_table};
 use crate::exchange::tables_output::loop_signals;
 use crate::exchange::tables_output::write_positions;
@@ -56,13 +58,15 @@ pub(super) struct Columns<'a> {
     pub(super) si: bool,
 }
 
+/// Name and type of each channel.
+type TypedChannels<'a> = Vec<(&'a str, SampleType)>;
+
 /// Records that share a file.
 struct RecordPart<'a> {
     /// Path relative to the export's folder.
     file: String,
     configuration: &'static str,
-    /// Names of the channels.
-    channels: Vec<&'a str>,
+    channels: TypedChannels<'a>,
     records: Vec<Sampled<'a>>,
 }
 
@@ -128,8 +132,8 @@ impl Columns<'_> {
         output::lines(told)
     }
 
-    /// Groups the records that share a file: one configuration, same channels, in the order of
-    /// measurement.
+    /// Groups the records that share a file: one configuration, same channels of the same types, in
+    /// the order of measurement.
     fn parts<'r>(
         &self,
         store: &Store,
@@ -137,11 +141,14 @@ impl Columns<'_> {
         maps: &'r BTreeMap<i64, ChannelMap>,
     ) -> Result<Vec<RecordPart<'r>>, CliError> {
         let cells: BTreeMap<i64, Cell> = store.cells()?.into_iter().map(|row| (row.id, row.cell)).collect();
-        let mut together: BTreeMap<(&'static str, Vec<&str>), Vec<Sampled<'_>>> = BTreeMap::new();
+        let mut together: BTreeMap<(&'static str, TypedChannels<'_>), Vec<Sampled<'_>>> = BTreeMap::new();
         for row in rows.iter().filter(|row| self.what.counts(row)) {
             // foreign keys of the file guarantee that both exist
             let (Some(cell), Some(map)) = (cells.get(&row.cell), maps.get(&row.session)) else { continue };
-            let channels = map.channels.iter().map(|channel| channel.name.as_str()).collect();
+            let of_channel = |(place, channel): (usize, &'r Channel)| {
+                (channel.name.as_str(), row.sample_types.channel(place))
+            };
+            let channels = map.channels.iter().enumerate().map(of_channel).collect();
             let of = (configuration_name(cell.configuration), channels);
             together.entry(of).or_default().push(Sampled { row, map });
         }
@@ -177,22 +184,37 @@ impl Columns<'_> {
     fn write_part(&self, part: &RecordPart<'_>, tell: &dyn Fn()) -> Result<Written, CliError> {
         // connections cannot be shared between threads
         let store = Store::open_read_only(&self.what.file)?;
-        let of_channel = if self.si { Stored::Single } else { Stored::Code };
+        let stored_as = |of: SampleType| {
+            match of {
+                SampleType::I16 if !self.si => Stored::Code,
+                SampleType::I32 if !self.si => Stored::Wide,
+                SampleType::I16 | SampleType::F32 => Stored::Single,
+                // single precision would round these
+                SampleType::I32 | SampleType::F64 => Stored::Double,
+            }
+        };
         let mut columns = vec![("record", Stored::Id), ("scan", Stored::Index)];
-        columns.extend(part.channels.iter().map(|name| (*name, of_channel)));
-        let notes = [("jointrig.channels", scales(&part.records).to_string())];
+        columns.extend(part.channels.iter().map(|(name, of)| (*name, stored_as(*of))));
+        let notes = [("jointrig.channels", scales(part).to_string())];
         let mut file = ParquetFile::create(&self.what.out.join(&part.file), &columns, &notes).map_err(bad)?;
         for Sampled { row, map } in &part.records {
             let samples = store.samples(row)?;
             let scans = i32::try_from(row.scans).map_err(|_| too_long(row))?;
             let mut values = vec![Values::Id(vec![row.id; row.scans]), Values::Whole((0..scans).collect())];
             for place in 0..part.channels.len() {
-                let codes = samples.channel(place);
-                values.push(if self.si {
-                    let si = map.to_si(place, codes);
-                    Values::Single(si.into_iter().map(|value| value as f32).collect())
-                } else {
-                    Values::Whole(codes.iter().map(|code| i32::from(*code)).collect())
+                let own = samples.channel(place);
+                let si = || map.to_si(place, own);
+                values.push(match own {
+                    ChannelView::I16(codes) if !self.si => {
+                        Values::Whole(codes.iter().map(|code| i32::from(*code)).collect())
+                    }
+                    ChannelView::I32(codes) if !self.si => Values::Whole(codes.to_vec()),
+                    ChannelView::F32(values) if !self.si => Values::Single(values.to_vec()),
+                    ChannelView::F64(values) if !self.si => Values::Double(values.to_vec()),
+                    ChannelView::I16(_) | ChannelView::F32(_) => {
+                        Values::Single(si().into_iter().map(|value| value as f32).collect())
+                    }
+                    ChannelView::I32(_) | ChannelView::F64(_) => Values::Double(si()),
                 });
             }
             file.write(&values).map_err(bad)?;
@@ -264,17 +286,19 @@ fn too_long(row: &RecordRow) -> CliError {
     CliError::Bad(format!("record {} has {} samples, more than can be counted in 32 bits", row.id, row.scans))
 }
 
-/// Data needed to convert codes: SI value = code × units_per_code, by session.
-fn scales(records: &[Sampled<'_>]) -> serde_json::Value {
-    let maps: BTreeMap<i64, &ChannelMap> = records.iter().map(|one| (one.row.session, one.map)).collect();
+/// Data needed to convert samples: SI value = sample × units_per_code, by session.
+fn scales(part: &RecordPart<'_>) -> serde_json::Value {
+    let maps: BTreeMap<i64, &ChannelMap> =
+        part.records.iter().map(|one| (one.row.session, one.map)).collect();
     let of_session = |(session, map): (i64, &ChannelMap)| {
         let channels: Vec<_> = map
             .channels
             .iter()
-            .map(|channel| {
+            .zip(&part.channels)
+            .map(|(channel, (_, of))| {
                 json!({
-                    "channel": channel.name.as_str(), "unit": channel.quantity.unit(),
-                    "units_per_code": channel.units_per_code(), "delay_s": f64::from(channel.delay_ns) * 1e-9,
+                    "channel": channel.name.as_str(), "unit": channel.quantity.unit(), "sample_type": of.name(),
+                    "units_per_code": of.units(channel), "delay_s": f64::from(channel.delay_ns) * 1e-9,
                 })
             })
             .collect();

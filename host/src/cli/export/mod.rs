@@ -52,7 +52,8 @@ pub struct Export {
     /// Format of FRFs and records.
     #[arg(long, value_enum)]
     format: Form,
-    /// Parquet: write samples in SI units as 32-bit floats instead of the converter's codes.
+    /// Parquet: write samples in SI units instead of as they came: 32-bit floats for i16 and f32,
+    /// 64-bit ones for i32 and f64.
     #[arg(long)]
     si: bool,
     #[command(flatten)]

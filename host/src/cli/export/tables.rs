@@ -11,7 +11,9 @@ use crate::campaign::store::Store;
 use crate::campaign::store::record_table::Overrule;
 use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::session_table::Sensor;
+use crate::campaign::store::stored::SampleTypes;
 use crate::cli::error::CliError;
+use crate::device::samples::SampleType;
 use crate::exchange::typed_table::{Kind, Table, Value};
 
 /// One row for each record.
@@ -60,13 +62,14 @@ const OVERRULES: [(&str, Kind); 4] =
     [("record", Kind::Whole), ("utc", Kind::Utc), ("verdict", Kind::Text), ("reason", Kind::Text)];
 
 /// One row for each channel of each session.
-const CHANNELS: [(&str, Kind); 15] = [
+const CHANNELS: [(&str, Kind); 16] = [
     ("session", Kind::Whole),
     ("place", Kind::Whole),
     ("channel", Kind::Text),
     ("role", Kind::Text),
     ("unit", Kind::Text),
     ("rate_hz", Kind::Real),
+    ("sample_type", Kind::Text),
     ("units_per_code", Kind::Real),
     ("units_per_volt", Kind::Real),
     ("units_per_volt_as_measured", Kind::Real),
@@ -244,14 +247,19 @@ fn of_record(row: &RecordRow, overruled: Option<&Overrule>) -> [Value; 17] {
     ]
 }
 
-/// Every channel of every session, with its scale.
+/// Every channel of every session, with the type of its samples (all records and levels of a session
+/// have the same) and its scale.
 pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
     let mut table = Table::new(&CHANNELS);
+    let mut types: HashMap<i64, SampleTypes> =
+        store.levels()?.into_iter().flatten().map(|row| (row.session, row.sample_types)).collect();
+    types.extend(store.records()?.into_iter().flatten().map(|row| (row.session, row.sample_types)));
     for (session, _) in store.sessions()? {
         let (now, then, sensors) =
             (store.channels(session)?, store.channels_as_measured(session)?, store.sensors(session)?);
         for (place, channel) in now.channels.iter().enumerate() {
             let sensor = sensors.get(place);
+            let of = types.get(&session).map_or(SampleType::I16, |types| types.channel(place));
             let known = |of: fn(&Sensor) -> &Option<String>| sensor.and_then(|sensor| of(sensor).clone());
             table.push(vec![
                 session.into(),
@@ -260,7 +268,8 @@ pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
                 format!("{:?}", channel.role).into(),
                 channel.quantity.unit().into(),
                 now.fs_hz().into(),
-                channel.units_per_code().into(),
+                of.name().to_owned().into(),
+                of.units(channel).into(),
                 channel.units_per_volt.into(),
                 then.channels[place].units_per_volt.into(),
                 channel.range_v.into(),

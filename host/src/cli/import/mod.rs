@@ -1,8 +1,8 @@
 //! `import`: imports FRFs and impact records measured with other systems.
 
+mod as_recorded;
 mod folder;
 mod names;
-mod quantised;
 mod records;
 
 use std::path::{Path, PathBuf};

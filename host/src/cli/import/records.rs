@@ -9,8 +9,8 @@ use jointrig_protocol::shot::{Phase, Shot};
 use sha2::{Digest, Sha256};
 use toml::Spanned;
 
+use super::as_recorded::as_recorded;
 use super::bad;
-use super::quantised::quantised;
 use crate::analyse::AnalysedLength;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
@@ -24,6 +24,7 @@ use crate::campaign::verdict::{Judgement, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
+use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use crate::exchange::StatedUnits;
 use crate::exchange::record_file::{PlannedPlace, RecordFile};
@@ -77,8 +78,8 @@ pub(super) struct Brought {
     pub(super) kept: usize,
     /// Hits that were already stored by an earlier import of the same file.
     pub(super) already: usize,
-    /// Channels of the last records as stored.
-    map: Option<ChannelMap>,
+    /// Name and type of each channel as stored.
+    types: Vec<String>,
     /// What was used of the last file, in one line.
     pub(super) taken: String,
 }
@@ -107,7 +108,7 @@ pub(super) fn import(
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = RecordSource::of(file, &called)?;
-    let Brought { hits, kept, already, map, taken, .. } =
+    let Brought { hits, kept, already, types, taken, .. } =
         bring(&mut store, &origin, name, read, replace, &mut |hit, verdict| {
             tell_line!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
         })?;
@@ -128,12 +129,9 @@ pub(super) fn import(
     if already > 0 {
         lines.push(format!("{already} of them were there already, from an earlier import of the same file"));
     }
-    let rounding: Vec<String> = map
-        .iter()
-        .flat_map(|map| &map.channels)
-        .map(|c| format!("{} {:.1e} {}", c.name, 0.5 * c.units_per_code().abs(), c.quantity.unit()))
-        .collect();
-    lines.push(format!("stored in 16 bits, rounded by at most: {}", rounding.join(", ")));
+    if already < hits {
+        lines.push(format!("stored with every digit: {}", types.join(", ")));
+    }
     output::lines(lines)
 }
 
@@ -163,10 +161,8 @@ pub(super) fn bring(
     let (read, axes) = along_plan(&plan, &cell, read).map_err(wrong)?;
     let RecordFile { records, delay_s, taken, .. } = read;
     let records = &records;
-    let mut groups = quantised(records, axes).map_err(wrong)?;
-    for group in &mut groups {
-        put_in_step(&mut group.map, &delay_s);
-    }
+    let (mut map, samples) = as_recorded(records, axes).map_err(wrong)?;
+    put_in_step(&mut map, &delay_s);
     let reversed: Vec<Option<f64>> = records.force_n.iter().map(|f| reversed_peak_n(f)).collect();
     if let (Some(peak_n), true) = (reversed.first().copied().flatten(), reversed.iter().all(Option::is_some))
     {
@@ -174,40 +170,40 @@ pub(super) fn bring(
             "the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1"
         )));
     }
-    let mut recordings: Vec<(usize, usize, Recording)> = Vec::new();
-    for (of_scale, group) in groups.iter().enumerate() {
-        for (hit, codes) in group.hits.iter().zip(&group.codes) {
-            let force_n = &records.force_n[*hit];
-            let pulse = Pulse::locate(force_n);
-            if pulse.is_none() && reversed[*hit].is_none() {
-                return Err(wrong(format!("hit {hit} has no force pulse: remove it")));
-            }
-            let own = recording(*hit, codes.clone(), group.map.len(), pulse.as_ref(), records.fs_hz);
-            recordings.push((*hit, of_scale, own));
+    let types = samples.first().map(Samples::types).unwrap_or_default();
+    let types = map.channels.iter().zip(types).map(|(c, of)| format!("{} {}", c.name, of.name())).collect();
+    let mut recordings: Vec<Recording> = Vec::new();
+    for (hit, own) in samples.into_iter().enumerate() {
+        let pulse = Pulse::locate(&records.force_n[hit]);
+        if pulse.is_none() && reversed[hit].is_none() {
+            return Err(wrong(format!("hit {hit} has no force pulse: remove it")));
         }
+        recordings.push(recording(hit, own, pulse.as_ref(), records.fs_hz));
     }
-    recordings.sort_by_key(|(hit, ..)| *hit);
     let there = already_there(store, origin, id, replace)?;
-    // hits with the same scales share a session
-    let mut sessions: Vec<Option<i64>> = vec![None; groups.len()];
-    let mut brought =
-        Brought { cells: 1, hits: recordings.len(), already: there.len(), taken, ..Brought::default() };
-    let mut others = Others::of(groups.first().and_then(|group| group.map.responses()).unwrap_or_default());
-    for (hit, of_scale, recording) in recordings {
-        let (hit, map) = (hit as u32, &groups[of_scale].map);
-        let verdict = ByRecord.judge(&cell, &plan, map, &recording, &others);
+    let mut own_session: Option<i64> = None;
+    let mut brought = Brought {
+        cells: 1,
+        hits: recordings.len(),
+        already: there.len(),
+        taken,
+        types,
+        ..Brought::default()
+    };
+    let mut others = Others::of(map.responses().unwrap_or_default());
+    for (hit, recording) in (0..).zip(recordings) {
+        let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
         if verdict.kind == Verdict::Good {
-            others.learn(&plan, map, recording.view());
+            others.learn(&plan, &map, &recording.samples);
             brought.kept += 1;
-            brought.map = Some(map.clone());
         }
         tell(hit, &verdict);
         if !there.contains(&hit) {
-            let session = match sessions[of_scale] {
+            let session = match own_session {
                 Some(session) => session,
-                None => store.begin_session(&session(origin), map)?,
+                None => store.begin_session(&session(origin), &map)?,
             };
-            sessions[of_scale] = Some(session);
+            own_session = Some(session);
             let record = NewRecord {
                 cell: id,
                 attempt: attempt + hit,
@@ -328,14 +324,13 @@ fn session(origin: &RecordSource) -> SessionInfo {
     }
 }
 
-fn recording(hit: usize, codes: Vec<i16>, channels: usize, pulse: Option<&Pulse>, fs_hz: f64) -> Recording {
+fn recording(hit: usize, samples: Samples, pulse: Option<&Pulse>, fs_hz: f64) -> Recording {
     let start = pulse.map_or(0, |pulse| pulse.start);
     Recording {
         epoch: 0,
         first_scan: 0,
         trigger_index: start,
-        channels,
-        codes,
+        samples,
         gaps: Vec::new(),
         shot: Shot {
             number: hit as u32,

@@ -33,10 +33,8 @@ impl Judge for ByShotSummary {
         if missing > 0 {
             return judged(Verdict::Gap, missing as f64, 0.0, format!("{missing} samples are missing"));
         }
-        for place in 0..recording.channels {
-            let extreme =
-                recording.channel(place).iter().filter(|code| **code == i16::MAX || **code == i16::MIN);
-            let touched = extreme.count();
+        for (place, channel) in recording.samples.each().enumerate() {
+            let touched = channel.at_the_ends(16);
             // a single code at the end of the range may be chance, two are a flat top
             if touched > 1 {
                 let name = channels.channels.get(place).map_or("?", |channel| channel.name.as_str());

@@ -25,6 +25,7 @@ use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::campaign::watch::Watchers;
 use jointrig::device::channels::ChannelMap;
 use jointrig::device::logs::Tables;
+use jointrig::device::samples::Samples;
 use jointrig::device::session::Session;
 use jointrig::device::stream::Recording;
 use jointrig::device::transport::Transport;
@@ -75,14 +76,14 @@ pub fn rows(store: &Store) -> Vec<RecordRow> {
 }
 
 /// What two equal runs have in common: everything except absolute scans and times.
-pub fn content(path: &Path) -> Vec<(i64, u32, Verdict, usize, u32, Vec<i16>)> {
+pub fn content(path: &Path) -> Vec<(i64, u32, Verdict, usize, u32, Samples)> {
     let store = Store::open_read_only(path).expect("opens");
     assert_eq!(store.verify().expect("checked"), []);
     let rows = self::rows(&store);
     rows.iter()
         .map(|row| {
-            let codes = store.samples(row).expect("samples").codes;
-            (row.cell, row.attempt, row.verdict, row.trigger_index, row.shot.pulse_us, codes)
+            let samples = store.samples(row).expect("samples");
+            (row.cell, row.attempt, row.verdict, row.trigger_index, row.shot.pulse_us, samples)
         })
         .collect()
 }
@@ -325,7 +326,7 @@ fn a_bolt_that_does_not_arrive_is_weak_and_the_pulse_grows() {
     let summary = run_on(&path, fake, &options(), &mut ByShotSummary).expect("runs");
     assert_eq!(summary.kept, 14);
     let records = content(&path);
-    assert_eq!((records[0].2, records[0].5.len()), (Verdict::Weak, 0));
+    assert_eq!((records[0].2, records[0].5.scans()), (Verdict::Weak, 0));
     assert!(records[0].4 < records[1].4);
 }
 

@@ -26,11 +26,11 @@ use crate::campaign::plan::level::{Held, Level, Moment};
 use crate::campaign::store::Store;
 use crate::campaign::store::is_simulated_board;
 use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
-use crate::campaign::store::record_table::Samples;
 use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::watch::{Seen, Shaking, Watchers};
 use crate::device::channels::ChannelMap;
+use crate::device::samples::{SampleType, Samples};
 use crate::device::session::Session;
 use crate::device::stream::by_channel;
 use crate::hysteresis::record::in_step;
@@ -287,7 +287,6 @@ impl Bench<'_> {
         // the ramp down to rest is part of a sweep's record
         let end = if level.end_hz.is_some() { self.session.expected()? } else { first_scan + taken.scans };
         let (codes, gaps) = self.session.cut(first_scan..end)?;
-        let channels = self.channels.len();
         let new = NewLevel {
             session: self.session_id,
             moment: self.options.moment,
@@ -295,8 +294,7 @@ impl Bench<'_> {
             settled: taken.settled,
             epoch: self.epoch,
             first_scan,
-            channels,
-            codes: by_channel(&codes, channels),
+            samples: by_channel(&codes, self.channels.len()),
             gaps,
         };
         let id = store.insert_level(&new)?;
@@ -443,15 +441,20 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Creates a meter for the channels of this device; with an open-loop drive, it measures the
+    /// Creates a meter for the codes of this device; with an open-loop drive, it measures the
     /// specimens' relative displacement to determine whether the structure has settled.
     pub fn new(channels: &ChannelMap, held: Held, frequency_hz: f64) -> Self {
+        Self::of(channels, held, frequency_hz, |_| SampleType::I16)
+    }
+
+    /// As [`Meter::new`], for channels of these types.
+    fn of(channels: &ChannelMap, held: Held, frequency_hz: f64, types: impl Fn(usize) -> SampleType) -> Self {
         let omega = TAU * frequency_hz;
         let term = |role: Role, gain: f64| {
             channels.place(role).map(|place| {
                 let channel = &channels.channels[place];
                 let late_s = f64::from(channel.delay_ns) * 1e-9;
-                (place, Complex::from_polar(gain * channel.units_per_code(), omega * late_s))
+                (place, Complex::from_polar(gain * types(place).units(channel), omega * late_s))
             })
         };
         let terms = match held {
@@ -477,14 +480,29 @@ impl Meter {
 
     /// Amplitude in these codes (interleaved scan by scan): m for velocities, N for a force.
     pub fn amplitude(&self, codes: &[i16], channels: usize) -> f64 {
-        let scans = codes.len() / channels;
+        self.over(codes.len() / channels, |place, scan| f64::from(codes[scan * channels + place]))
+    }
+
+    /// Amplitude of a stored level, in the same units.
+    pub fn of_record(channels: &ChannelMap, held: Held, frequency_hz: f64, samples: &Samples) -> f64 {
+        let meter = Self::of(channels, held, frequency_hz, |place| samples.channel(place).of());
+        let mut values = vec![Vec::new(); samples.channels()];
+        for (place, _) in &meter.terms {
+            values[*place].clear();
+            samples.channel(*place).scaled(1.0, &mut values[*place]);
+        }
+        meter.over(samples.scans(), |place, scan| values[place][scan])
+    }
+
+    /// The amplitude from the sample of a channel in a scan.
+    fn over(&self, scans: usize, sample: impl Fn(usize, usize) -> f64) -> f64 {
         let cycles = (scans as f64 / self.cycle_scans).floor();
         let whole = ((cycles * self.cycle_scans).round() as usize).min(scans);
         let sum: Complex<f64> = self
             .terms
             .iter()
             .map(|(place, unit)| {
-                let at = |scan: usize| f64::from(codes[scan * channels + place]);
+                let at = |scan: usize| sample(*place, scan);
                 let mean = (0..whole).map(at).sum::<f64>() / whole.max(1) as f64;
                 let tone: Complex<f64> = (0..whole)
                     .map(|scan| Complex::cis(-self.turn_per_scan * scan as f64) * (at(scan) - mean))
@@ -545,16 +563,14 @@ fn sum(channels: &ChannelMap, samples: &Samples, places: &[(usize, f64)]) -> Vec
     sum.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sum)| {
         for (n, (place, part)) in places.iter().enumerate() {
             let Some(channel) = channels.channels.get(*place) else { continue };
-            let scale = channel.units_per_code() * part;
-            let codes = &samples.channel(*place)[chunk * CHUNK..];
-            let cell = |code: &i16| f64::from(*code) * scale;
-            let pairs = sum.iter_mut().zip(codes);
+            let own = samples.channel(*place).part(chunk * CHUNK, (chunk + 1) * CHUNK);
+            let scale = own.of().units(channel) * part;
             if n == 0 {
                 // write without reading: reading fresh memory before the first write maps each page
                 // twice, with an interrupt to every core
-                pairs.for_each(|(sum, code)| *sum = 0.0 + cell(code));
+                own.put(sum, |sum, sample| *sum = 0.0 + sample * scale);
             } else {
-                pairs.for_each(|(sum, code)| *sum += cell(code));
+                own.put(sum, |sum, sample| *sum += sample * scale);
             }
         }
     });
@@ -645,6 +661,7 @@ impl ChannelLimits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::samples::ChannelSamples;
     use jointrig_protocol::channel::{Channel, Quantity};
 
     fn map() -> ChannelMap {
@@ -690,6 +707,17 @@ mod tests {
             let got = meter.amplitude(&codes, 3);
             assert!((got / (3f64.sqrt() * 1e-7) - 1.0).abs() < 1e-3, "{frequency_hz} Hz: {got}");
             assert_eq!(Meter::new(&map, Held::Force, frequency_hz).amplitude(&codes, 3), 0.0);
+            // the stored level gives the same number, and in SI units one as near
+            let stored = by_channel(&codes, 3);
+            let of = |map: &ChannelMap, samples: &Samples| {
+                Meter::of_record(map, Held::Displacement, frequency_hz, samples)
+            };
+            assert_eq!(of(&map, &stored), got);
+            let si = (0..3).map(|place| ChannelSamples::F64(map.to_si(place, stored.channel(place))));
+            let si = Samples::new(si.collect()).expect("equally long");
+            let mut in_si = map.clone();
+            in_si.channels.iter_mut().for_each(|channel| channel.units_per_volt = 1.0);
+            assert!((of(&in_si, &si) / got - 1.0).abs() < 1e-12);
         }
     }
 
