@@ -48,3 +48,8 @@ pub mod spectra;
 pub mod structure;
 pub mod substructuring;
 mod vectors;
+
+/// A complex value at one line of a spectrum.
+pub(crate) type C = nalgebra::Complex<f64>;
+/// A complex matrix at one line of a spectrum, such as the FRFs of outputs × inputs.
+pub(crate) type Line = nalgebra::DMatrix<C>;

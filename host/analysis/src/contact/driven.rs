@@ -14,11 +14,9 @@ use super::block::{Block, Group};
 use super::line::{Eliminated, eliminated};
 use super::model::{A, LineModel, Sparse, T};
 use super::parameters::{COMPLIANCE, DELAYS, GAINS, RETARDATION};
+use crate::C;
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex;
 use std::collections::BTreeMap;
-
-type C = Complex<f64>;
 
 /// The motions used: z, θ_x, θ_y of arm B, then of specimen B (the same if it has no points of its
 /// own), then θ_x, θ_y of A.

@@ -13,6 +13,7 @@ use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
 use super::outcome::Interval;
 use super::parameters::{COMPLIANCE, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N};
+use crate::C;
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
@@ -20,11 +21,8 @@ use crate::parallel::prelude::*;
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::joint_over_bands::NORMAL_95;
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
-
-type C = Complex<f64>;
 
 /// The band that the lightly damped lines must cover: wider than the band in which levels can be
 /// read.

@@ -2,16 +2,14 @@
 
 use super::tests::{ARM, BESIDE, DAMPING, K, LEVER_M, MASS, NAMES, SPECIMEN, SPOTS};
 use super::*;
+use crate::C;
 use crate::frf::MotionQuantity;
 use crate::spectra::cross_spectra::{CrossSpectra, OutputSums};
 use crate::structure::Structure;
-use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
-
-type C = Complex<f64>;
 
 /// Sum of the forces at the contact per newton of any hit on A, N.
 const FORCE: f64 = 1.3;

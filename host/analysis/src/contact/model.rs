@@ -11,10 +11,8 @@ use super::block::{Block, BlockCell, Group};
 use super::parameters::{
     COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS,
 };
+use crate::C;
 use nalgebra::{DMatrix, DVector};
-use num_complex::Complex;
-
-type C = Complex<f64>;
 
 /// Largest number of coordinates of the motion.
 const MOST: usize = 18;

@@ -2,16 +2,14 @@
 //! contact that was put in.
 
 use super::*;
+use crate::C;
 use crate::frf::MotionQuantity;
 use crate::spectra::cross_spectra::{CrossSpectra, OutputSums};
 use crate::structure::Structure;
-use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
-
-type C = Complex<f64>;
 
 pub(super) const K: f64 = 140e6;
 pub(super) const DAMPING: f64 = 2000.0;

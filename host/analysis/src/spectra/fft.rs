@@ -33,6 +33,7 @@
 
 use super::SpectraError;
 use super::window::{RUN, ResponseWeighting};
+use crate::C;
 use crate::vectors::{all_finite, wide};
 use bytemuck::cast_slice_mut;
 use num_complex::Complex;
@@ -43,8 +44,6 @@ use std::array::from_fn;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
-
-type C = Complex<f64>;
 
 /// A plan for records of one length.
 pub(super) struct RecordTransform {

@@ -4,6 +4,7 @@
 
 use super::joint_over_bands::stiffness_and_damping;
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::Line;
 use crate::band::Band;
 use crate::frf::{Frf, FrfError};
 use crate::parallel::prelude::*;
@@ -148,8 +149,6 @@ pub fn boolean(names: &[String], pairs: &[(&str, &str)]) -> Result<DMatrix<f64>,
     }
     Ok(b)
 }
-
-type Line = DMatrix<Complex<f64>>;
 
 /// Difference between the coupled and the measured assembly, line by line.
 #[derive(Debug, Clone, PartialEq)]

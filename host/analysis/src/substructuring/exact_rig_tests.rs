@@ -1,11 +1,10 @@
 //! Test data: exact FRFs of two rigid bodies on suspensions, alone and joined by a known contact.
 
 use super::geometry::{Configuration, Geometry, Grouping, Point};
+use crate::Line;
 use crate::frf::{Frf, MotionQuantity};
-use nalgebra::{Complex, DMatrix, Vector3};
+use nalgebra::{Complex, Vector3};
 use std::f64::consts::TAU;
-
-type Line = DMatrix<Complex<f64>>;
 
 const SIGMA_PER_S: f64 = 2.3;
 const AXES: [(&str, [f64; 3]); 3] = [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];

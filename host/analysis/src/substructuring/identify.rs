@@ -11,6 +11,7 @@ use super::method::Method;
 pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, RefusedReason};
 use super::solve::{Solution, Solutions};
+use crate::Line;
 use crate::band::Band;
 use crate::frf::common_lines::{self, CommonLines, OtherLines};
 use crate::frf::{Frf, MotionQuantity};
@@ -263,7 +264,6 @@ fn measured_set<'a>(files: &'a [Cow<'_, Frf>; 3], geometry: &'a Geometry) -> Mea
     }
 }
 
-type Line = DMatrix<Complex<f64>>;
 type Solved = (Method, Result<Solution, Refused>);
 
 /// Every method's solution or refusal, and Y^A and Y^B if `alone` requests them and they exist.

@@ -6,11 +6,10 @@ use super::idm::IdmSet;
 use super::product::product_of_block;
 use super::vpt;
 use super::vpt::{ROTATION_LENGTH_M, Transformation, VptError, reduce_inputs};
+use crate::Line;
 use crate::frf::{Frf, FrfError, block};
 use crate::structure::Structure;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
-
-type Line = DMatrix<Complex<f64>>;
 
 /// The reason why the data of an interface cannot be formed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -4,9 +4,7 @@
 use super::geometry::Grouping;
 use super::interface_data::{Balanced, Found, InterfaceError, MeasuredSet, Side};
 use super::vpt::reduce_inputs;
-use nalgebra::{Complex, DMatrix};
-
-type Line = DMatrix<Complex<f64>>;
+use crate::Line;
 
 /// The points that count as internal.
 #[derive(Clone, Copy, PartialEq)]

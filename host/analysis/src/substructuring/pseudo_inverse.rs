@@ -9,12 +9,11 @@
 //! elimination and Gram–Schmidt take a third of the time; otherwise QR with column pivoting is
 //! used, whose pivots determine the rank.
 
+use crate::Line;
 use crate::vectors::wide;
-use nalgebra::{ColPivQR, Complex, DMatrix, Dyn};
+use nalgebra::{ColPivQR, Complex, Dyn};
 use pulp::NullaryFnOnce;
 use std::cmp::Ordering;
-
-type Line = DMatrix<Complex<f64>>;
 
 /// A pivot below this fraction of the largest is rounding: a dozen operations on doubles leave
 /// about 1e-15, while the weakest true direction in exact data is about 1e-8.
@@ -254,8 +253,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn matrix(rows: usize, columns: usize, v: &[f64]) -> DMatrix<Complex<f64>> {
-        DMatrix::from_fn(rows, columns, |r, c| {
+    fn matrix(rows: usize, columns: usize, v: &[f64]) -> Line {
+        Line::from_fn(rows, columns, |r, c| {
             let i = (r * columns + c) * 2;
             Complex::new(v[i], v[i + 1])
         })
@@ -271,10 +270,10 @@ mod tests {
             let a = matrix(7, 4, &v);
             let plus = full_rank_inverse(&a, "A").expect("random matrices have full rank");
             // condition numbers of such matrices stay below 1e3
-            prop_assert!((&plus * &a - DMatrix::identity(4, 4)).norm() < 1e-11);
+            prop_assert!((&plus * &a - Line::identity(4, 4)).norm() < 1e-11);
             let wide = a.adjoint();
             let plus = full_rank_inverse(&wide, "A").expect("random matrices have full rank");
-            prop_assert!((&wide * &plus - DMatrix::identity(4, 4)).norm() < 1e-11);
+            prop_assert!((&wide * &plus - Line::identity(4, 4)).norm() < 1e-11);
         }
     }
 
@@ -286,9 +285,9 @@ mod tests {
         let (left, right) = (turn(matrix(6, 4, &v)), turn(matrix(4, 4, &v)));
         for weak in [1e-2, 1e-6, 1e-7, 1e-8, 1e-9, 1e-11] {
             let sizes = nalgebra::DVector::from_vec([1.0, 0.3, 2.0, weak].map(Complex::from).to_vec());
-            for tall in [&left * DMatrix::from_diagonal(&sizes), &right * DMatrix::from_diagonal(&sizes)] {
+            for tall in [&left * Line::from_diagonal(&sizes), &right * Line::from_diagonal(&sizes)] {
                 let a = tall * right.adjoint();
-                let left_over = full_rank_inverse(&a, "A").expect("full rank") * &a - DMatrix::identity(4, 4);
+                let left_over = full_rank_inverse(&a, "A").expect("full rank") * &a - Line::identity(4, 4);
                 // rounding times the condition number
                 assert!(left_over.norm() < 1e-14 / weak, "{weak}: {}", left_over.norm());
             }
@@ -312,7 +311,7 @@ mod tests {
 
     #[test]
     fn small_directions_are_kept_and_lost_ones_refused() {
-        let mut a = DMatrix::<Complex<f64>>::identity(3, 3);
+        let mut a = Line::identity(3, 3);
         a[(2, 2)] = Complex::new(1e-9, 0.0);
         let inverse = full_rank_inverse(&a, "A").expect("rank three");
         assert!((inverse[(2, 2)].re * 1e-9 - 1.0).abs() < 1e-12);

@@ -9,13 +9,12 @@ use super::internal_dofs::Which;
 use super::method::Method;
 use super::pseudo_inverse::full_rank_inverse;
 use super::quality::{VirtualPointQuality, consistency, passivity, reciprocity};
+use crate::Line;
 use crate::band::Band;
 use crate::parallel::prelude::*;
 use crate::structure::Structure;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::Complex;
 use std::sync::OnceLock;
-
-type Line = DMatrix<Complex<f64>>;
 
 /// The reason why one method with one IDM set gave no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

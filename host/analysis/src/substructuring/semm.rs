@@ -14,11 +14,10 @@
 //! "extended"` is always true. Here it truncates.
 
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::Line;
 use crate::frf::{Frf, FrfError, block};
 use crate::parallel::prelude::*;
-use nalgebra::{Complex, DMatrix};
-
-type Line = DMatrix<Complex<f64>>;
+use nalgebra::Complex;
 
 /// Singular values below this fraction of the largest are rounding.
 const ROUNDING: f64 = 1e-13;

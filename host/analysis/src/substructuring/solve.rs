@@ -8,9 +8,7 @@ use super::method::Method;
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
 use super::reduced::{MethodKind, Reduced, RefusedReason, every_line};
-use nalgebra::{Complex, DMatrix};
-
-type Line = DMatrix<Complex<f64>>;
+use crate::Line;
 
 /// Z^J per line, with notes for the user.
 pub(super) struct Solution {

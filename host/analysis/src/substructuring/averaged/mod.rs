@@ -30,13 +30,14 @@ use super::idm::{Dof, IdmSet};
 use super::interface_data::{InterfaceError, balance};
 use super::joint_over_bands::{NORMAL_95, median, stiffness_and_damping};
 use super::pseudo_inverse::{RankLost, full_rank_inverse};
+use crate::Line;
 use crate::band::Band;
 use crate::frf::Frf;
 use crate::frf::noise::shared_by_lines;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::parallel::prelude::*;
 use assembly::Assembly;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::Complex;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -49,8 +50,6 @@ pub use bootstrap::{CellHits, Replicates};
 mod assembly;
 mod bootstrap;
 mod sensitivity;
-
-type Line = DMatrix<Complex<f64>>;
 
 /// Largest relative half-width of the lines' unweighted mean, at the typical compliance: above it
 /// the lines contain no information that weights could select.

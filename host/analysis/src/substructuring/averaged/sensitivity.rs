@@ -10,10 +10,9 @@
 use super::assembly::Assembly;
 use super::assembly::Axes;
 use super::{Line, Priors, compliance};
+use crate::C;
 use crate::substructuring::product::product;
-use nalgebra::{Complex, Vector3};
-
-type C = Complex<f64>;
+use nalgebra::Vector3;
 
 /// Weighted sums over lines: the sensitivities to errors common to all lines, and the variance of
 /// the noise.

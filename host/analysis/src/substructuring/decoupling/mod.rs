@@ -20,6 +20,7 @@
 
 use super::product::product;
 use super::pseudo_inverse::{RankLost, full_rank_inverse, rank};
+use crate::Line;
 use nalgebra::{Complex, DMatrix};
 
 /// Name of Y^AJB_cc in errors.
@@ -256,8 +257,6 @@ pub(crate) fn with_m_inverse(
 pub fn observed_rank(p: &DMatrix<Complex<f64>>, q: &DMatrix<Complex<f64>>) -> usize {
     rank(p).min(rank(q))
 }
-
-type Line = DMatrix<Complex<f64>>;
 
 /// The motions of the fixture for which compatibility and equilibrium are required.
 #[derive(Debug, Clone, Copy)]

@@ -6,6 +6,7 @@
 //! A's and then B's.
 
 use super::{FitError, Internals};
+use crate::Line;
 use crate::band::Band;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
@@ -13,9 +14,7 @@ use crate::substructuring::idm::IdmSet;
 use crate::substructuring::interface_data::{Found, InterfaceError, Measured, balance};
 use crate::substructuring::product::product;
 use crate::substructuring::vpt;
-use nalgebra::{Complex, DMatrix, Vector3};
-
-pub(super) type Line = DMatrix<Complex<f64>>;
+use nalgebra::{DMatrix, Vector3};
 
 /// The axes of one sensor.
 pub(super) struct Sensor {

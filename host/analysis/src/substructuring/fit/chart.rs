@@ -9,10 +9,8 @@
 //! The full matrices are K = S⁻¹ L Lᵀ S⁻¹, C = S⁻¹ M Mᵀ S⁻¹ / ω with lower triangles L and M and
 //! S = diag(√u): symmetric and positive semidefinite.
 
-use super::block::Line;
-use nalgebra::{Complex, DMatrix, DVector};
-
-type C = Complex<f64>;
+use crate::{C, Line};
+use nalgebra::{DMatrix, DVector};
 
 /// The entries of K and C that are free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]

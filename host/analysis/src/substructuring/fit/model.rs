@@ -4,13 +4,11 @@
 //! Y^AJB = Y − P G⁻¹ Q with P = Y Bᵀ, Q = B Y and G = B Y Bᵀ + Y^J. A change of Y alone gives L δY
 //! R with L = I − P G⁻¹ B and R = I − Bᵀ G⁻¹ Q; a change of the joint gives −P δ(G⁻¹) Q.
 
-use super::block::{Line, Ports};
+use super::block::Ports;
 use super::chart::At;
 use crate::substructuring::product::product;
 use crate::substructuring::pseudo_inverse::full_rank_inverse;
-use nalgebra::Complex;
-
-type C = Complex<f64>;
+use crate::{C, Line};
 
 /// The assembly's ports: A's first, then B's.
 pub(super) struct Layout {

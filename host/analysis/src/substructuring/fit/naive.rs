@@ -1,17 +1,15 @@
 //! The weights computed naively from the formulas, line by line and cell by cell: the reference for
 //! the fast ones.
 
-use super::block::Line;
 use super::cell::CellGeometry;
 use super::chart::Chart;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
 use super::*;
 use crate::substructuring::exact_rig_tests::rig;
-use nalgebra::{Complex, DMatrix, DVector};
+use crate::{C, Line};
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
-
-type C = Complex<f64>;
 
 /// Lines per band and seed of `weight`: the draws must be the same.
 const SAMPLED: usize = 4;

@@ -1,8 +1,8 @@
 //! The covariance of one band's residual. Noise of a line is circular, so it is one Hermitian
 //! matrix N.
 
-use super::block::Line;
 use super::factor::{Factor, rows};
+use crate::Line;
 use crate::substructuring::product::product;
 use nalgebra::DMatrix;
 

@@ -9,20 +9,19 @@
 
 use super::FitError;
 use super::assembly_aims::Pushes;
-use super::block::{Line, ReceptanceBlock};
+use super::block::ReceptanceBlock;
 use super::cell::CellGeometry;
 use super::cell::{AIMS, Nuisances};
 use super::chart::{At, Chart};
 use super::model::{Layout, Predicted, Slopes, Wanted};
 use super::noise::{ByImpact, Noise};
 use crate::parallel::prelude::*;
+use crate::{C, Line};
 use nalgebra::{Complex, DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::Range;
-
-type C = Complex<f64>;
 
 /// Approximate width over which residuals are averaged, Hz: fewer residuals, whose noise is known
 /// more accurately.

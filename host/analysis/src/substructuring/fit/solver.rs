@@ -2,13 +2,13 @@
 //! integrated out and linearised again at their current estimate.
 
 use super::FitError;
-use super::block::Line;
 use super::chart::{Chart, FreeEntries};
 use super::factor::Factor;
 use super::model::Layout;
 use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
+use crate::Line;
 use crate::errors_in_variables::NoiseInflation;
 use crate::parallel::join;
 use crate::parallel::prelude::*;

@@ -10,7 +10,7 @@
 
 use super::FitError;
 use super::assembly_aims::{AssemblyAims, Met, OfImpact};
-use super::block::{Line, ReceptanceBlock};
+use super::block::ReceptanceBlock;
 use super::cell::AIMS;
 use super::cell::{CellGeometry, factors};
 use super::chart::Chart;
@@ -21,10 +21,9 @@ use super::noise::{ByImpact, Whitening};
 use super::problem::{Corrected, Problem};
 use crate::parallel::prelude::*;
 use crate::substructuring::product::product;
-use nalgebra::{Complex, DMatrix, DVector};
+use crate::{C, Line};
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
-
-type C = Complex<f64>;
 
 /// Lines per band at which the noise that passes through L and R is evaluated: it varies slowly.
 const SAMPLED: usize = 4;

@@ -3,11 +3,9 @@
 use crate::substructuring::interface_data::{Balanced, Side};
 use crate::substructuring::product::product;
 use crate::vectors::wide;
-use nalgebra::{Complex, DMatrix};
+use crate::{C, Line};
+use nalgebra::DMatrix;
 use pulp::NullaryFnOnce;
-
-type C = Complex<f64>;
-type Line = DMatrix<C>;
 
 /// Index of AJB's file; A and B are 0 and 1.
 pub(super) const ASSEMBLED: usize = 2;

@@ -23,14 +23,13 @@ use super::method::Method;
 use super::product::product;
 use super::pseudo_inverse::full_rank_inverse;
 use super::reduced::{MethodKind, Reduced, RefusedReason, every_line};
+use crate::Line;
 use crate::band::Band;
 use dyads::{ASSEMBLED, Both, Dyads, MeasuredBlock, own};
 use nalgebra::{Complex, DMatrix};
 use std::collections::BTreeMap;
 
 mod dyads;
-
-type Line = DMatrix<Complex<f64>>;
 
 /// Standard deviations of one line's stiffness and damping due to the FRFs' noise alone, \[line\];
 /// NaN if the variance of a cell with influence is not known.
