@@ -1,5 +1,5 @@
-//! The interface between a campaign and the stages of its analysis: its geometry, its cells, the kept
-//! hits of one cell in SI units; the options of the analysis, and its progress.
+//! The interface between a campaign and the stages of its analysis: its geometry, its cells, the
+//! kept hits of one cell in SI units; the options of the analysis, and its progress.
 
 use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;

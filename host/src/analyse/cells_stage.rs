@@ -1,8 +1,8 @@
 //! Reads and averages the cells, one at a time on each thread, without keeping their signals.
 //!
-//! What is kept of single hits: the spectra that the bootstrap needs (the assembly's interface cells
-//! in the main band), and the response per newton, which shows whether the contact slips under the
-//! hammer.
+//! What is kept of single hits: the spectra that the bootstrap needs (the assembly's interface
+//! cells in the main band), and the response per newton, which shows whether the contact slips
+//! under the hammer.
 
 use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
 use super::cell::Progress;

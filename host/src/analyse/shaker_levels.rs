@@ -1,5 +1,5 @@
-//! The shaker's levels: each level's loop with the raw and the corrected force, its k_T or the reason
-//! why it has none, an example loop, the law over amplitude.
+//! The shaker's levels: each level's loop with the raw and the corrected force, its k_T or the
+//! reason why it has none, an example loop, the law over amplitude.
 
 use super::averages::CellAverage;
 use super::cell::{Measurements, ShakerLevel};

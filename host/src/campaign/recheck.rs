@@ -1,5 +1,5 @@
-//! Compares what the raw samples yield with what the file states: verdicts with their measure, limit
-//! and peak, and the amplitudes of the shaker's levels.
+//! Compares what the raw samples yield with what the file states: verdicts with their measure,
+//! limit and peak, and the amplitudes of the shaker's levels.
 //!
 //! Checksums show whether a row is as it was written. This shows whether it was right: each record
 //! is judged again as it was at the time, with the plan, the scales and the earlier good records

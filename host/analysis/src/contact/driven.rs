@@ -33,7 +33,7 @@ const ORDER: usize = 4;
 const HIGHER: usize = ORDER + 2;
 
 /// One line of one impact: its motion, and the quantities for its derivatives.
-struct Line {
+struct DrivenLine {
     s: C,
     x: DVector<C>,
     q: DMatrix<C>,
@@ -60,7 +60,7 @@ pub struct Driven<'a> {
     blocks: &'a [Block],
     parts: &'a [Part],
     /// By line and part.
-    lines: Vec<Vec<Line>>,
+    lines: Vec<Vec<DrivenLine>>,
     /// The combined motion of the parts, by line.
     motion: Vec<DVector<C>>,
     /// Complex weight of each line's ratio in the ratio at the frequency.
@@ -116,8 +116,8 @@ impl<'a> Driven<'a> {
             return None;
         }
         let of_parts = |l: &usize| parts.iter().map(|part| line(blocks, part.block, *l, p)).collect();
-        let lines: Vec<Vec<Line>> = near.iter().map(of_parts).collect::<Option<_>>()?;
-        let together = |own: &Vec<Line>| {
+        let lines: Vec<Vec<DrivenLine>> = near.iter().map(of_parts).collect::<Option<_>>()?;
+        let together = |own: &Vec<DrivenLine>| {
             let mut sum = DVector::zeros(own[0].x.len());
             for (line, part) in own.iter().zip(parts) {
                 sum += &line.x * C::from(part.weight);
@@ -229,7 +229,7 @@ fn residual(nodes: &[C], values: &[C], order: usize) -> f64 {
 }
 
 /// The motion of one line, with the hammer's shifts removed as far as the fit determined them.
-fn line(blocks: &[Block], which: usize, line: usize, p: &[f64]) -> Option<Line> {
+fn line(blocks: &[Block], which: usize, line: usize, p: &[f64]) -> Option<DrivenLine> {
     let block = &blocks[which];
     let shifts = if block.shifted_by.is_empty() {
         None
@@ -251,7 +251,7 @@ fn line(blocks: &[Block], which: usize, line: usize, p: &[f64]) -> Option<Line> 
 }
 
 /// Eliminates the motion of one line with specimen A's z as a free coordinate.
-fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>) -> Option<Line> {
+fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>) -> Option<DrivenLine> {
     let line = &block.lines[line];
     let mut free = p.to_vec();
     (free[COMPLIANCE], free[RETARDATION]) = (0.0, 0.0);
@@ -274,5 +274,13 @@ fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>
     for row in &mut derivatives {
         row.retain(|(i, _)| *i != freed);
     }
-    x[T].is_finite().then(|| Line { s: line.s, x, q, r, derivatives, weight: line.weight.clone(), shifts })
+    x[T].is_finite().then(|| DrivenLine {
+        s: line.s,
+        x,
+        q,
+        r,
+        derivatives,
+        weight: line.weight.clone(),
+        shifts,
+    })
 }

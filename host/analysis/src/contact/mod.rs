@@ -22,8 +22,8 @@
 //! - `block`: the measured signals of each cell, and the cells of an impact
 //! - `parameters`: the unknowns
 //! - `model`: the signals as a linear map of the motion; `line`: its elimination
-//! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell beyond
-//!   its noise
+//! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell
+//!   beyond its noise
 //! - `diagnosis`: tests of the assumptions, and the band in which the bodies are rigid
 //! - `outcome`: the result and the sources of its uncertainty
 //! - `levels`: k_T of the shaker's levels, given the result of the hits; `driven`: the rotation of

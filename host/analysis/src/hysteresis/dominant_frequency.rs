@@ -179,15 +179,15 @@ pub(super) fn turns(range: Range<usize>, step: f64) -> Vec<Complex<f64>> {
 
 /// Σ x e^(i `step` n), n counted from the first sample.
 pub(super) fn line_sum(x: &[f64], step: f64) -> Complex<f64> {
-    wide(Line { signal: x, step })
+    wide(LineSum { signal: x, step })
 }
 
-struct Line<'a> {
+struct LineSum<'a> {
     signal: &'a [f64],
     step: f64,
 }
 
-impl NullaryFnOnce for Line<'_> {
+impl NullaryFnOnce for LineSum<'_> {
     type Output = Complex<f64>;
 
     #[expect(clippy::inline_always, reason = "must be inlined to use the processor's vectors")]

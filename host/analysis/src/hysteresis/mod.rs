@@ -10,8 +10,9 @@
 //! Definitions are stated only here: k_T is the least-squares slope of the stick part; k_eq that of
 //! the whole loop; the peak secant and the ratio of fundamentals have their own names. T is used as
 //! given: the load cells' sum is not T at the contact (the static arm's inertia adds 2.4 % at 250
-//! Hz). [`static_arm`] identifies the arm's parameters and converts it to the contact's force, and the corrected record is analysed in addition to the raw one. [`compliance`]
-//! treats the same signals in the frequency domain, [`backbone`] several levels.
+//! Hz). [`static_arm`] identifies the arm's parameters and converts it to the contact's force, and
+//! the corrected record is analysed in addition to the raw one. [`compliance`] treats the same
+//! signals in the frequency domain, [`backbone`] several levels.
 
 pub mod analyse;
 pub mod backbone;

@@ -247,8 +247,8 @@ fn of_record(row: &RecordRow, overruled: Option<&Overrule>) -> [Value; 17] {
     ]
 }
 
-/// Every channel of every session, with the type of its samples (all records and levels of a session
-/// have the same) and its scale.
+/// Every channel of every session, with the type of its samples (all records and levels of a
+/// session have the same) and its scale.
 pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
     let mut table = Table::new(&CHANNELS);
     let mut types: HashMap<i64, SampleTypes> =

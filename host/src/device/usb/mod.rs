@@ -2,8 +2,8 @@
 //! frames.
 //!
 //! Only the address selects this interface instead of the serial port; the controller answers on
-//! the interface on which it last received a message. [`attached`](fn@attached) lists controllers, [`Usb::open`]
-//! opens one, and transfers stay queued for its bytes.
+//! the interface on which it last received a message. [`attached`](fn@attached) lists controllers,
+//! [`Usb::open`] opens one, and transfers stay queued for its bytes.
 
 mod attached;
 mod queue;

@@ -5,7 +5,7 @@ use super::figure_html;
 use super::text::{Html, escaped};
 use crate::report::figure::Figure;
 use crate::report::figures::{Chapter, Entry};
-use crate::report::words::number::{Line, UNKNOWN};
+use crate::report::words::number::{AnswerLine, UNKNOWN};
 use crate::report::words::{self, answer_sentences, brief};
 use crate::results::Results;
 
@@ -23,7 +23,7 @@ pub fn answer(html: &mut Html, results: &Results, drawn: &[(&Entry, Option<Figur
             ]
             .into_iter()
             .flatten()
-            .map(Line::words),
+            .map(AnswerLine::words),
         );
     }
     if lines.is_empty() {
@@ -77,7 +77,7 @@ fn missing(html: &mut Html, results: &Results) {
 }
 
 /// A line's text, in which each number is marked with its path in `results.json`.
-fn told(html: &mut Html, line: &Line) {
+fn told(html: &mut Html, line: &AnswerLine) {
     let mut rest = escaped(&line.text);
     for (shown, place) in &line.numbers {
         let shown = escaped(shown);

@@ -1,6 +1,6 @@
 //! The answer in words: what an engineer would say about each number.
 
-use super::number::{BETWEEN, CLAMP, CONTACT, Line};
+use super::number::{AnswerLine, BETWEEN, CLAMP, CONTACT};
 use super::number::{micro, short};
 use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
@@ -121,12 +121,12 @@ pub fn capital(text: &str) -> String {
 
 /// Why the stiffness of the contact and that between the arms differ, in one sentence; `None` if
 /// one of them is not known.
-pub fn why_they_differ(results: &Results) -> Option<Line> {
+pub fn why_they_differ(results: &Results) -> Option<AnswerLine> {
     let answer = results.answer.as_ref()?;
     let contact = answer.contact.k_t_n_per_m.as_ref()?.mean;
     let between = answer.between_arms.k_n_per_m.as_ref()?.mean;
     let Some(clamp) = &answer.clamp else {
-        return Some(Line::words(
+        return Some(AnswerLine::words(
             "Nothing soft was found between the arms and the contact, so both stiffnesses are the same."
                 .into(),
         ));
@@ -137,7 +137,7 @@ pub fn why_they_differ(results: &Results) -> Option<Line> {
         "They differ because the clamps ({of_clamps} N/µm) and the contact ({of_contact}) act in series: together they have {of_both} N/µm."
     );
     Some(
-        Line::words(text)
+        AnswerLine::words(text)
             .stiffness(clamps, &format!("{CLAMP}/mean"))
             .stiffness(contact, &format!("{CONTACT}/mean"))
             .stiffness(between, &format!("{BETWEEN}/mean")),

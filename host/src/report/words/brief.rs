@@ -2,7 +2,9 @@
 //! terminal's output, and the first line of `identify`, the number that was requested.
 
 use super::answer_sentences::{why_they_differ, with_interval};
-use super::number::{BETWEEN, CLAMP, CONTACT, Line, TRUTH, UNKNOWN, band, decimals, micro, short, stiffness};
+use super::number::{
+    AnswerLine, BETWEEN, CLAMP, CONTACT, TRUTH, UNKNOWN, band, decimals, micro, short, stiffness,
+};
 use super::summary;
 use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::Interval;
@@ -12,8 +14,8 @@ use crate::results::{
 };
 use crate::substructuring::{Dof, fit};
 
-fn line(head: &str, text: impl Into<String>) -> Line {
-    Line { head: head.into(), text: text.into(), numbers: Vec::new() }
+fn line(head: &str, text: impl Into<String>) -> AnswerLine {
+    AnswerLine { head: head.into(), text: text.into(), numbers: Vec::new() }
 }
 
 /// What was measured; a simulated rig is identified as such first. The names of the structures
@@ -56,7 +58,7 @@ fn measured_on(results: &Results) -> String {
 }
 
 /// The main results; empty if no campaign was analysed.
-pub fn answer(results: &Results) -> Vec<Line> {
+pub fn answer(results: &Results) -> Vec<AnswerLine> {
     let Some(answer) = &results.answer else { return Vec::new() };
     let own = &answer.contact;
     let mut lines = vec![match &own.k_t_n_per_m {

@@ -100,7 +100,7 @@ pub const CLAMP: &str = "/answer/clamp/k_n_per_m";
 
 /// One line: its subject, and the statement about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Line {
+pub struct AnswerLine {
     /// The subject; may be empty.
     pub head: String,
     /// The statement.
@@ -109,7 +109,7 @@ pub struct Line {
     pub numbers: Vec<(String, String)>,
 }
 
-impl Line {
+impl AnswerLine {
     /// Whether it is the true value of a simulated rig, which was not measured.
     pub fn is_truth(&self) -> bool {
         self.head == TRUTH
@@ -117,7 +117,7 @@ impl Line {
 
     /// A line without subject and without numbers from `results.json`.
     pub fn words(text: String) -> Self {
-        Line { head: String::new(), text, numbers: Vec::new() }
+        AnswerLine { head: String::new(), text, numbers: Vec::new() }
     }
 
     /// Adds the numbers of an interval at `place`, as in `N/µm (95 % low…high)`.
