@@ -3,11 +3,9 @@
 //! `--json` prints exactly one document to stdout and nothing else; progress, prompts and messages
 //! go to stderr. An error is one to a few lines: what failed, where, what to do.
 //!
-//! `completions`: prints a shell's completion script.
-//!
-//! `man`: prints the manual page, or writes one for each command.
-//!
-//! Tunes the system's allocator for short-lived signals and matrices.
+//! Two small subcommands are part of this file: `completions` prints a shell's completion script,
+//! and `man` prints the manual page, or writes one for each command. It also tunes the system's
+//! allocator for short-lived signals and matrices.
 
 use crate::untrusted_text::{tell_line, visible};
 use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};

@@ -1,11 +1,10 @@
-//! Printing on stdout: one JSON document, or lines of text; a closed pipe is no error.
+//! What a command shows in the terminal, and how it is interrupted.
 //!
-//! Numbers on the command line.
-//!
-//! Progress of a long task: a bar on a terminal, otherwise a line every ten seconds, so that a log
-//! shows that work continues.
-//!
-//! Ctrl-C: the first one ends the work after the current shot, the second one ends the program.
+//! - Results are printed on stdout as one JSON document, or as lines of text; a closed pipe is no
+//!   error. Numbers are formatted for the command line.
+//! - The progress of a long task is a bar on a terminal, otherwise a line every ten seconds, so
+//!   that a log shows that work continues.
+//! - The first Ctrl-C ends the work after the current shot, the second one ends the program.
 
 use super::error::CliError;
 use crate::campaign::run::progress::Pace;

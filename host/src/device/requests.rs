@@ -1,13 +1,11 @@
-//! Requests of a session's user, and waiting for their results.
+//! Requests of a session's user, and waiting for their results: among them the shaker's, and those
+//! of synchronisation with another recorder (the clock that times the scans, and edges that both
+//! record).
 //!
-//! The shaker from the host's side: order, renewal and rest.
-//!
-//! An order is valid for a limited time of the device's clock and must be renewed by another
-//! [`Session::shake`]. A session that ends while the shaker may be moving orders it to rest. If the
-//! process is killed, the device does so itself after one second without a message.
-//!
-//! Synchronisation with another recorder: the clock that times the scans, and edges that both
-//! record.
+//! The shaker is ordered, renewed and brought to rest from here. An order is valid for a limited
+//! time of the device's clock and must be renewed by another [`Session::shake`]. A session that
+//! ends while the shaker may be moving orders it to rest. If the process is killed, the device does
+//! so itself after one second without a message.
 
 use super::channels::ChannelMap;
 use super::claims;

@@ -1,19 +1,13 @@
-//! Arrays in npz archives: the layer that the FRF and record files share.
+//! Arrays in npz archives, read and written: the layer that the FRF and record files share.
 //!
-//! Reads real, complex and text arrays of any numpy width, in either byte order and either memory
-//! order; always returns C order and the widest type. Every error names the file, the array and
-//! what was expected of it. Values are read as a stream. The memory for all that is read of one
-//! file is bounded by the file's size, because a few compressed bytes may expand to a billion
-//! zeros.
+//! Reading accepts real, complex and text arrays of any numpy width, in either byte order and
+//! either memory order, and always returns C order and the widest type. Every error names the file,
+//! the array and what was expected of it. Values are read as a stream. The memory for all that is
+//! read of one file is bounded by the file's size, because a few compressed bytes may expand to a
+//! billion zeros. An untrusted zip archive is opened only if its list of members is of a bounded
+//! length.
 //!
-//! Errors of reading and writing npz files.
-//!
-//! Opens untrusted zip archives only if their list of members is of a bounded length.
-//!
-//! The values of one array: numbers of any width and either byte order, texts, and the order of
-//! their axes.
-//!
-//! Writes arrays into an npz archive: float64, complex128 and unicode, in C order.
+//! Writing produces float64, complex128 and unicode, in C order.
 
 use super::npy_header::Header;
 use super::units;

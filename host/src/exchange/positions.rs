@@ -1,10 +1,9 @@
-//! Geometry tables: the pyFBS workbook (xlsx), or the same tables as csv files in one folder.
+//! Reads a geometry in any of its file formats, among them its tables: the pyFBS workbook (xlsx),
+//! or the same tables as csv files in one folder.
 //!
 //! Eight sheets (`Channels_A`, `Impacts_A`, …, `VP_Channels`, `VP_RefChannels`) whose columns are
 //! found by their headings; positions are in metres. Every error names sheet, row and column; the
 //! row is numbered as in a spreadsheet program.
-//!
-//! Reads a geometry in any of its file formats.
 
 use super::tables::{SheetCell, Tables, csv_tables, workbook_tables};
 use crate::substructuring::geometry::{Configuration, FARTHEST_M, Geometry, Grouping, Point};

@@ -1,11 +1,9 @@
 //! Sheets of a workbook, or csv files of a folder, as rows of cells. Only the requested tables are
 //! read, cell by cell, up to the size that a geometry can have.
 //!
-//! Checks the claims of a workbook before its reader acts on them.
-//!
-//! A workbook is an archive of texts. Its reader allocates as many shared texts as one attribute
-//! claims, and keeps the inflated texts in memory. Both are checked here by inflating every part
-//! once and discarding it.
+//! A workbook's claims are checked before its reader acts on them. A workbook is an archive of
+//! texts. Its reader allocates as many shared texts as one attribute claims, and keeps the inflated
+//! texts in memory. Both are checked here by inflating every part once and discarding it.
 
 use crate::untrusted_input::megabytes;
 use crate::{advice, untrusted_input};

@@ -1,7 +1,5 @@
-//! Writes FRFs and records as comma-separated text: one row per line or sample, one heading per
-//! column.
-//!
-//! Writes a geometry as a folder of csv tables, in the form of the pyFBS workbook that
+//! Writes comma-separated text: FRFs and records with one row per line or sample and one heading
+//! per column, and a geometry as a folder of csv tables, in the form of the pyFBS workbook that
 //! [`super::read_positions`] reads.
 
 use super::positions::PositionsError;

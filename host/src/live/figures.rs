@@ -1,7 +1,6 @@
-//! Figures of single records and cells for the live page: a hit, its channels, all hits of a cell
-//! overlaid, and the positions of hammer and vibrometer for a cell.
-//!
-//! Figures of the force spectrum of the last hit and of the growing average FRF of its cell.
+//! Figures for the live page: a hit, its channels, all hits of a cell overlaid, the positions of
+//! hammer and vibrometer for a cell, the force spectrum of the last hit, and the growing average
+//! FRF of its cell.
 
 use super::averaging::{Average, Averages, NoSpectra, of_hit};
 use super::now::Shaker;

@@ -1,7 +1,5 @@
-//! Tests the assumptions of the estimate on its residuals.
-//!
-//! The band in which the model holds: beyond it an arm or a specimen bends, or the load cells'
-//! calibration ends.
+//! Tests the assumptions of the estimate on its residuals, and finds the band in which the model
+//! holds: beyond it an arm or a specimen bends, or the load cells' calibration ends.
 //!
 //! The bodies are rigid up to their first bending mode, whose frequency is unknown before the
 //! measurement. The residuals of a fit over the whole band show it: if they contradict the model at

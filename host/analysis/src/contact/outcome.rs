@@ -1,8 +1,5 @@
-//! The result: k_T and c_T with their intervals, the sources of their uncertainty, and k_T(f).
-//!
-//! A value with its confidence interval.
-//!
-//! Sources of the uncertainty of a compliance.
+//! The result: k_T and c_T with their confidence intervals, the sources of uncertainty of a
+//! compliance, and k_T(f).
 
 use super::block::Block;
 use super::diagnosis::{Diagnosis, Doubt, diagnose, part};

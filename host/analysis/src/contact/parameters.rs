@@ -1,7 +1,6 @@
 //! The unknowns of the fit: the contact, the form that gives its force, and all rig quantities that
-//! are not known exactly, each with its prior.
-//!
-//! Prior standard deviations of positions, angles, gains and delays.
+//! are not known exactly, each with its prior; positions, angles, gains and delays have prior
+//! standard deviations.
 
 use crate::substructuring::averaged::Priors as Positions;
 use serde::Serialize;

@@ -2,15 +2,13 @@
 //!
 //! A contact alone is a real, constant compliance. A resonance that moves only one of the measured
 //! points (a specimen that rotates in its clamp) gives it an imaginary part near its frequency:
-//! loops there become ellipses.
+//! loops there become ellipses. From hits, the compliance is found with the hammer's force as the
+//! instrumental variable.
 //!
-//! The contact's compliance from hits, with the hammer's force as the instrumental variable.
-//!
-//! Checks whether a peak of Im Δx/T is present in every hit, or is noise.
-//!
-//! Of several hundred lines one is always the largest. Where T is weak the noise of Δx/T is also
-//! largest, so in a noisy measurement the largest line lies there and looks like a resonance.
-//! Independent groups of hits, which share only the structure, distinguish the two.
+//! A peak of Im Δx/T may also be noise. Of several hundred lines one is always the largest. Where T
+//! is weak the noise of Δx/T is also largest, so in a noisy measurement the largest line lies there
+//! and looks like a resonance. Independent groups of hits, which share only the structure,
+//! distinguish the two: a resonance is present in every hit.
 
 use super::record::{HysteresisRecord, Relative};
 use crate::spectra::CrossSpectra;

@@ -1,12 +1,9 @@
-//! Cuts a steady record into its cycles.
+//! Cuts a steady record into its cycles, with the displacement integrated from velocity and the
+//! first and third harmonic of a cycle's signals.
 //!
 //! One minute of a record has thousands of cycles, and storing all of them as vectors would take
 //! several times the memory of the record. They are therefore cut on demand, on all cores, and
 //! whatever is needed of all cycles is summed in the same pass.
-//!
-//! First and third harmonic of a cycle's signals.
-//!
-//! Integration of velocity to displacement.
 
 use super::HysteresisError;
 use super::loops::Cycle;

@@ -4,9 +4,8 @@
 //! such a length takes several times as long as one of a length with small prime factors, and
 //! planning it takes as long again. Lengths with small factors are transformed directly. Other
 //! records are zero-padded to the next such length to find where the spectrum is high; the lines of
-//! the original length are then computed only there, each by direct summation.
-//!
-//! Single lines of a spectrum by direct summation, and the phase factors used for it.
+//! the original length are then computed only there, each by direct summation with its phase
+//! factors.
 
 use crate::spectra::fft::forward;
 use crate::vectors::wide;

@@ -1,8 +1,6 @@
 //! Identifies which specimen has a hidden resonance: the phase of each specimen relative to its own
-//! arm, from the same impact (the paper's Fig. 8).
-//!
-//! Fits a decay with a few decaying sinusoids, to check whether two modes alone explain a
-//! specimen's motion.
+//! arm, from the same impact (the paper's Fig. 8). To check whether two modes alone explain a
+//! specimen's motion, its decay is fitted with a few decaying sinusoids.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex;

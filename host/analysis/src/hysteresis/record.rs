@@ -1,6 +1,5 @@
-//! Data of a hysteresis measurement: motion on both sides of the contact, and the tangential force.
-//!
-//! Aligns signals in time: removes the delays of each channel's decoder and converter.
+//! Data of a hysteresis measurement: motion on both sides of the contact, and the tangential force,
+//! aligned in time by removing the delays of each channel's decoder and converter.
 
 use super::HysteresisError;
 use crate::parallel::prelude::*;

@@ -1,25 +1,22 @@
-//! Identifies the static arm between contact and load cells: its effective mass m at the contact
-//! and the parallel path ρ in F = (1 + ρ) T + m ẍ_B (see `Correction`).
+//! The static arm B between contact and load cells: from the cells' sum to the force at the
+//! contact, and how the arm's properties are identified.
 //!
-//! There are two methods. **Hits on B alone**: the force at the contact is that of the hammer,
-//! transformed to the virtual point; both m and ρ come from one least-squares fit over frequency.
-//! **Stuck loops at several frequencies**: T/Δx = k/(1 + ρ) − m/(1 + ρ) · ẍ_B/Δx must give the same
-//! k at all of them; ρ cannot be separated from k this way and must be known. A contact with a
-//! hidden resonance has no common k, which shows in the fit's residual.
-//!
-//! A steady record as complex amplitudes, one per stretch.
-//!
-//! From the load cells' sum to the force at the contact.
-//!
-//! The static arm B lies between contact and load cells. The force of the contact on B is balanced
-//! by the load cells, by anything parallel to them (a lower push rod), and by B's inertia:
+//! The force of the contact on B is balanced by the load cells, by anything parallel to them (a
+//! lower push rod), and by B's inertia:
 //!
 //! F = (1 + ρ) T + m ẍ_B
 //!
 //! with T the cells' sum, ρ the stiffness parallel to the cells over theirs, and m B's *effective*
-//! mass at the contact. This is not the arm's mass: the arm also rotates about its supports, so
-//! that only part of it moves with the contact. On a rig of 1.56 kg over 150 N/µm, T reads 2.4 %
-//! too high at 250 Hz and 14 % at 500 Hz.
+//! mass at the contact (see `Correction`). This is not the arm's mass: the arm also rotates about
+//! its supports, so that only part of it moves with the contact. On a rig of 1.56 kg over 150 N/µm,
+//! T reads 2.4 % too high at 250 Hz and 14 % at 500 Hz.
+//!
+//! There are two methods to find m and ρ. **Hits on B alone**: the force at the contact is that of
+//! the hammer, transformed to the virtual point; both m and ρ come from one least-squares fit over
+//! frequency. **Stuck loops at several frequencies**, from a steady record as complex amplitudes,
+//! one per stretch: T/Δx = k/(1 + ρ) − m/(1 + ρ) · ẍ_B/Δx must give the same k at all of them; ρ
+//! cannot be separated from k this way and must be known. A contact with a hidden resonance has no
+//! common k, which shows in the fit's residual.
 
 use super::HysteresisError;
 use super::record::{HysteresisRecord, RelativeMotion, within};

@@ -1,9 +1,6 @@
-//! From impact records to spectra: finds the start of each hit, applies windows, and averages
-//! spectra.
-//!
-//! Impact records: the raw signals of the hammer and the sensors, before any processing.
-//!
-//! The band in which the hammer effectively excited the structure.
+//! From impact records to spectra: takes the raw signals of the hammer and the sensors, finds the
+//! start of each hit, applies windows, averages spectra, and finds the band in which the hammer
+//! effectively excited the structure.
 
 use super::SpectraError;
 use super::average::SpectraAverage;

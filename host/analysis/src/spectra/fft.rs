@@ -1,35 +1,24 @@
 //! The transform of a windowed record, as a whole or in pieces, with the lines in the order in
 //! which they are computed.
 //!
-//! The transform of a real record, computed by a complex one of half its length: even samples are
-//! the real parts, odd ones the imaginary parts.
+//! **As a whole**, a real record is transformed by a complex one of half its length: even samples
+//! are the real parts, odd ones the imaginary parts. The lines are separated only where they are
+//! read, which saves a pass through memory. With Z the transform of half the length M = N/2, X(k) =
+//! ½ (Z(k) + Z*(M−k)) − ½ i e^(−i2πk/N) (Z(k) − Z*(M−k)).
 //!
-//! The lines are separated only where they are read, which saves a pass through memory. With Z the
-//! transform of half the length M = N/2, X(k) = ½ (Z(k) + Z*(M−k)) − ½ i e^(−i2πk/N) (Z(k) −
-//! Z*(M−k)).
+//! **In pieces**, one long transform of a real record is computed as eight short ones, because a
+//! long transform and its factors do not fit into a core's fastest cache, and a piece does. One
+//! pass over the sixteen parts of the record is needed, after which each piece is independent. For
+//! N samples x(n) and q = N/16, piece p is y_p(j) = e^(−i2πpj/N) Σ_r e^(−i2πpr/16) x(j + rq), and
+//! its transform holds X(16k + p) at k (decimation in frequency). Pieces 1 to 7 also contain the
+//! mirrored lines 16k − p, because X(N − l) = X*(l). The remaining lines, every eighth one, form
+//! the transform of a real record of an eighth of the length, Σ_r x(j + 2rq): this is piece 0.
 //!
-//! Computes one long transform of a real record as eight short ones: one pass over the sixteen
-//! parts of the record, after which each piece is independent.
-//!
-//! For N samples x(n) and q = N/16, piece p is y_p(j) = e^(−i2πpj/N) Σ_r e^(−i2πpr/16) x(j + rq),
-//! and its transform holds X(16k + p) at k (decimation in frequency). Pieces 1 to 7 also contain
-//! the mirrored lines 16k − p, because X(N − l) = X*(l). The remaining lines, every eighth one,
-//! form the transform of a real record of an eighth of the length, Σ_r x(j + 2rq): this is piece 0.
-//!
-//! A long transform and its factors do not fit into a core's fastest cache; a piece does.
-//!
-//! The order in which a transform leaves its lines: in stretches, each from one piece, in which
-//! line numbers advance by a constant step.
-//!
-//! FFT scratch buffers, reused because fresh memory costs as much as a transform's first pass over
-//! it.
-//!
-//! Destinations for the lines of a transform.
-//!
-//! A record together with its window: transforms apply the weights while reading the samples.
-//!
-//! FFT plans, kept for each recurring length, because computing a plan's factors takes longer than
-//! a transform.
+//! A transform leaves its lines in stretches, each from one piece, in which line numbers advance by
+//! a constant step, and writes them to a destination. The window's weights are applied while
+//! reading the samples. Scratch buffers are reused, because fresh memory costs as much as a
+//! transform's first pass over it. Plans are kept for each recurring length, because computing a
+//! plan's factors takes longer than a transform.
 
 use super::SpectraError;
 use super::window::{RUN, ResponseWeighting};

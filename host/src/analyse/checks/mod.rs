@@ -1,13 +1,10 @@
-//! Checks of the credibility of the numbers: one file per check, with the figures behind it.
+//! Checks of the credibility of the numbers, with the figures behind them. They test whether
 //!
-//! Checks whether six rigid motions suffice to describe the motion that coupling adds.
-//!
-//! Checks whether n_i internal points resolve all n_c interface motions, for both forms of Eq. (3)
-//! with the most modes.
-//!
-//! Checks whether A and B, coupled by the joint found, reproduce the measured assembly.
-//!
-//! Checks whether A and B are the same structures in all configurations.
+//! - six rigid motions suffice to describe the motion that coupling adds
+//! - n_i internal points resolve all n_c interface motions, for both forms of Eq. (3) with the most
+//!   modes
+//! - A and B, coupled by the joint found, reproduce the measured assembly
+//! - A and B are the same structures in all configurations
 
 use crate::identified::SCATTER_OF_LINES;
 use crate::results::MAIN_BAND;

@@ -1,14 +1,9 @@
 //! The plan of a campaign: what is struck and measured, how often, and what counts as a good hit.
 //!
-//! A plan is a TOML file (`docs/plans/paper.toml` is the example). Unknown fields are refused, and
-//! every error names file, line and field. Lengths are in m, forces in N, times in s unless a name
-//! states otherwise.
-//!
-//! Synchronisation with another recorder.
-//!
-//! Who swings the hammer.
-//!
-//! The laboratory's measurement errors: the plan's `[priors]`.
+//! A plan is a TOML file (`docs/plans/paper.toml` is the example). It also states who swings the
+//! hammer, the synchronisation with another recorder, and the laboratory's measurement errors
+//! (`[priors]`). Unknown fields are refused, and every error names file, line and field. Lengths
+//! are in m, forces in N, times in s unless a name states otherwise.
 
 use crate::contact::ContactPriors;
 use crate::structure::Structure;

@@ -1,15 +1,13 @@
-//! The sensor on a channel, as described by a plan or a laboratory's calibration file.
+//! The sensors of a plan: what is on a channel, as described by the plan or a laboratory's
+//! calibration file, and where it measures.
 //!
-//! The load cells' measurement of the force along the sliding direction.
+//! The channels of a response are those of the vibrometer, which moves from point to point, or
+//! those of a fixed sensor; the load cells measure the force along the sliding direction. Impacts,
+//! responses and fixed sensors have positions.
 //!
-//! Channels of a response: those of the vibrometer, which moves from point to point, or those of a
-//! fixed sensor.
-//!
-//! Implausible values in a plan: lengths in mm, angles in degrees, excessive numbers. A new
-//! campaign is refused with them; an existing campaign that was measured with them can still be
-//! read.
-//!
-//! Positions of the impacts, responses and fixed sensors of a plan.
+//! Implausible values are looked for as well: lengths in mm, angles in degrees, excessive numbers.
+//! A new campaign is refused with them; an existing campaign that was measured with them can still
+//! be read.
 
 use super::faults::{Faults, first, read};
 use super::structure::{dot, unit};

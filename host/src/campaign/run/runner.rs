@@ -1,5 +1,6 @@
 //! The runner: measures the wanted number of good hits in every cell, stores each record, and
-//! resumes where it stopped.
+//! resumes where it stopped, from the cell's records of earlier runs and the statistics of the good
+//! ones.
 //!
 //! A cell starts with the structure at rest, and each later hit is affected by the residual motion
 //! of the earlier ones (within the plan's limit). On a device that moves hammer and laser by itself
@@ -8,10 +9,8 @@
 //! and the next hit is bit-identical to that of an uninterrupted run. A real structure is not
 //! struck again: it comes to rest, and the cell continues.
 //!
-//! A cell's records from earlier runs, and the statistics of the good ones.
-//!
-//! Target force of each hit of a cell: the plan's force, and a lower one for every second hit if
-//! the plan requests it. Each force has a separate closed loop.
+//! The target force of each hit is the plan's force, or a lower one for every second hit if the
+//! plan requests it. Each force has a separate closed loop.
 
 use super::answers::Answers;
 use super::answers::{Edits, Recount};

@@ -1,8 +1,7 @@
 //! Records in the campaign file: stored once, read back checked, never changed.
 //!
-//! A record of the campaign file: its columns, and its types before storing and after reading.
-//!
-//! Verdicts overruled by a person: stored in addition to the original; the last one counts.
+//! The file defines a record's columns, and its types before storing and after reading. Verdicts
+//! overruled by a person are stored in addition to the original; the last one counts.
 
 use super::codec::CodecError;
 use super::error::StoreError;

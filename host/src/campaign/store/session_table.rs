@@ -1,11 +1,10 @@
-//! Sessions in the campaign file: the connected device, its channels, and the sensors on them.
+//! Sessions in the campaign file: the connected device, its channels and the sensors on them, and
+//! what is stored along with a session.
 //!
-//! Synchronisation data in the campaign file: the clock that timed a session's scans, and edges
-//! that another recorder also records.
-//!
-//! They are stored only for a plan with `[sync]`; other files do not have these tables.
-//!
-//! The specimen's temperature in the campaign file, as measured by the controller.
+//! - The specimen's temperature, as measured by the controller.
+//! - Synchronisation data: the clock that timed a session's scans, and edges that another recorder
+//!   also records. They are stored only for a plan with `[sync]`; other files do not have these
+//!   tables.
 
 use super::Store;
 use super::error::StoreError;

@@ -1,8 +1,7 @@
 //! Builds the document from the findings: every number and sentence of `results.json`.
 //!
-//! Provenance of the results: the information in the file, and how the analysis used its records.
-//!
-//! Converts the findings on the interface to the format of the results.
+//! This includes the findings on the interface, converted to the format of the results, and the
+//! provenance of the results: the information in the file, and how the analysis used its records.
 
 use super::words::{check_sentences, side_by_side, warning_sentences};
 use crate::analyse::Findings;

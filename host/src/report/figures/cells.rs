@@ -1,8 +1,8 @@
-//! The matrix of cells: hits kept, compared with those planned.
+//! Figures of the cells and their positions:
 //!
-//! Positions of hammer and vibrometer in space (the paper's Fig. 4).
-//!
-//! The slope from each impact, by impact position.
+//! - the matrix of cells: hits kept, compared with those planned
+//! - the positions of hammer and vibrometer in space (the paper's Fig. 4)
+//! - the slope from each impact, by impact position
 
 use super::MICRO;
 use crate::report::figure::{

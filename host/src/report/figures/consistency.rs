@@ -1,11 +1,10 @@
-//! Fraction of the measurement that rigid motions of the virtual points reproduce, channel by
-//! channel and impact by impact.
+//! Figures of how well rigid motions describe the measurement:
 //!
-//! The CMIF: singular values of the change caused by coupling, over frequency (the paper's Fig.
-//! B.15).
-//!
-//! Participation of rigid motions in the change caused by coupling (accompanies the paper's Fig.
-//! B.15).
+//! - the fraction of the measurement that rigid motions of the virtual points reproduce, channel by
+//!   channel and impact by impact
+//! - the CMIF: singular values of the change caused by coupling, over frequency (the paper's Fig.
+//!   B.15)
+//! - the participation of rigid motions in that change (accompanies the paper's Fig. B.15)
 
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Marker, Packed, Panel, Role, Shape, Spread};
 use crate::results::{MAIN_BAND, Results, VirtualPoint};

@@ -1,13 +1,10 @@
-//! One impact at the contact: the time signals and the loop of the first cycle with its slope (the
-//! paper's Fig. 7).
+//! Figures of the contact's motion after one hit:
 //!
-//! Loops of the first, third and fourth cycle after one hit, on the same scales (the paper's Fig.
-//! 7).
-//!
-//! One loop with its parts marked, and its time signals (the paper's Fig. 3).
-//!
-//! The specimens' decay after one hit, and its reconstruction from two sinusoids (the paper's Fig.
-//! 9).
+//! - one impact at the contact: the time signals and the loop of the first cycle with its slope
+//!   (the paper's Fig. 7)
+//! - loops of the first, third and fourth cycle, on the same scales (the paper's Fig. 7)
+//! - one loop with its parts marked, and its time signals (the paper's Fig. 3)
+//! - the specimens' decay, and its reconstruction from two sinusoids (the paper's Fig. 9)
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Shape as Drawn};

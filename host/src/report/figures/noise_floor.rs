@@ -1,12 +1,11 @@
-//! An FRF compared with its own noise, and the resulting dynamic stiffness (the paper's Fig. C.16).
+//! Figures of the measurement's noise and excitation:
 //!
-//! The random error of each cell's FRF.
-//!
-//! Coherence of every cell, one strip each.
-//!
-//! Frequency ranges in which the hammer's force was sufficient.
-//!
-//! The hammer over the campaign: peak force of every hit, and the coil's pulse that produced it.
+//! - an FRF compared with its own noise, and the resulting dynamic stiffness (the paper's Fig.
+//!   C.16)
+//! - the random error of each cell's FRF
+//! - the coherence of every cell, one strip each
+//! - the frequency ranges in which the hammer's force was sufficient
+//! - the hammer over the campaign: peak force of every hit, and the coil's pulse that produced it
 
 use super::{MICRO, below_name};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Marker, Packed, Panel, Role, Shape, Spread};

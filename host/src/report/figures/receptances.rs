@@ -1,6 +1,5 @@
-//! FRFs of A, B and the assembly: magnitude, phase and coherence, side by side.
-//!
-//! A matrix of FRFs from a file or from memory.
+//! FRFs of A, B and the assembly: magnitude, phase and coherence, side by side, from a matrix of
+//! FRFs of a file or from memory.
 
 use crate::frf::{Frf, MotionQuantity};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Panel, Role, Spread};

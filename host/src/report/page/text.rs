@@ -1,9 +1,8 @@
-//! Builds HTML: all text from a file is escaped by [`escaped`], and no number is separated from its
-//! unit by a line break.
+//! Builds the page's text as HTML: all text from a file is escaped by [`escaped`], and no number is
+//! separated from its unit by a line break.
 //!
-//! The glossary in the page, from the text of `docs/glossary.md`.
-//!
-//! Links the first use of each glossary term in the page, and marks text between backticks as code.
+//! Text between backticks is marked as code. The page contains the glossary, from the text of
+//! `docs/glossary.md`, and the first use of each of its terms is a link to it.
 
 use crate::report::svg::drawing::escape;
 use std::cmp::Reverse;

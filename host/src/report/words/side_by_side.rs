@@ -1,7 +1,5 @@
-//! FBS and loops side by side (the paper's Tables 2 and 3): every type of stiffness that was found,
-//! and its meaning.
-//!
-//! Sentences for the comparison of two campaigns.
+//! Sentences for comparisons: FBS and loops side by side (the paper's Tables 2 and 3), with every
+//! type of stiffness that was found and its meaning, and two campaigns.
 
 use super::level_sentences::slope_name;
 use super::names::{BETWEEN_SPOTS, slope};
