@@ -201,7 +201,8 @@ impl<'a> ChannelView<'a> {
         each_type!(ChannelView, self, samples => of(samples, targets, put));
     }
 
-    /// Number of codes at an end of the converter's range of `bits`; 0 for values that are no codes.
+    /// Number of codes at an end of the converter's range of `bits`; 0 for values that are not
+    /// codes.
     pub fn at_the_ends(self, bits: u8) -> usize {
         let Some([low, high]) = self.of().extremes(bits) else { return 0 };
         match self {

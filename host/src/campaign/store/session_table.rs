@@ -47,8 +47,9 @@ table! {
 }
 
 table! {
-    /// A channel: SI value = code · units_per_volt · range_v / 2ⁿ⁻¹, where n is 16 for samples of type
-    /// i16 and `bits` for i32; or sample · units_per_volt for f32 and f64. A range of 0 is unknown.
+    /// A channel: SI value = code · units_per_volt · range_v / 2ⁿ⁻¹, where n is 16 for samples of
+    /// type i16 and `bits` for i32; or sample · units_per_volt for f32 and f64. A range of 0 is
+    /// unknown.
     pub(super) struct ChannelColumns {
         "channels" {
             "session INTEGER NOT NULL REFERENCES sessions(id)",

@@ -17,8 +17,8 @@ pub struct Verify {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Judge every record and measure every level again from the raw samples, and compare the results
-    /// with the file.
+    /// Judge every record and measure every level again from the raw samples, and compare the
+    /// results with the file.
     #[arg(long)]
     deep: bool,
 }
