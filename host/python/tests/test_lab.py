@@ -45,9 +45,9 @@ def test_signals_are_those_of_the_export_bit_for_bit(small_file: Path, tmp_path:
     assert codes.dtype == np.int16 and codes.shape[0] == len(record.channels)
     assert codes.flags["C_CONTIGUOUS"] and codes.base is not None, "Rust's own memory"
     force = codes[record.channels.index("force")].astype(float)
-    own = record.samples("force")
-    assert own.dtype == np.int16 and np.array_equal(own, force)
-    assert np.array_equal(own * record.scale("force"), record.signal("force"))
+    stored = record.samples("force")
+    assert stored.dtype == np.int16 and np.array_equal(stored, force)
+    assert np.array_equal(stored * record.scale("force"), record.signal("force"))
     scale = record.signal("force")[record.trigger_index + 5] / force[record.trigger_index + 5]
     assert np.allclose(force * scale, record.signal("force"), rtol=1e-12, atol=0)
 
