@@ -83,8 +83,8 @@ pub enum Consent {
 impl Consent {
     /// Asks only if stdin is a terminal and `CI` is not set.
     pub fn new(yes: bool) -> Self {
-        let somebody = std::io::stdin().is_terminal() && std::env::var_os("CI").is_none();
-        if yes || !somebody { Self::Given } else { Self::Ask }
+        let interactive = std::io::stdin().is_terminal() && std::env::var_os("CI").is_none();
+        if yes || !interactive { Self::Given } else { Self::Ask }
     }
 
     /// Returns if `what` is permitted; otherwise the error states what was declined.

@@ -421,4 +421,4 @@ fn write_overrule(
 
 #[cfg(test)]
 #[path = "store_tests.rs"]
-mod tests;
+pub(super) mod tests;

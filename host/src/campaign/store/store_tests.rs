@@ -33,7 +33,7 @@ fn map() -> ChannelMap {
     }
 }
 
-fn info() -> SessionInfo {
+pub(crate) fn info() -> SessionInfo {
     SessionInfo {
         address: "sim:".into(),
         board: "virtual".into(),
@@ -45,7 +45,7 @@ fn info() -> SessionInfo {
     }
 }
 
-fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
+pub(crate) fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
     let shot = Shot {
         number: attempt + 1,
         phase: Phase::Done,
@@ -74,7 +74,7 @@ fn record(cell: i64, attempt: u32, session: i64, kind: Verdict) -> NewRecord {
 }
 
 /// The rows of all records, which must be undamaged.
-fn rows(store: &Store) -> Vec<RecordRow> {
+pub(crate) fn rows(store: &Store) -> Vec<RecordRow> {
     store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
 }
 

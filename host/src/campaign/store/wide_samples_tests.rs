@@ -1,19 +1,18 @@
 //! Records of any width: through the file, from a file of version 2, and what 24 bits are worth.
 
 use super::codec::bits;
-use super::record_table::{NewRecord, RecordRow};
-use super::session_table::{Counters, SessionInfo};
-use super::stored::Hex;
+use super::record_table::NewRecord;
+use super::record_table::tests::{self, info, rows};
+use super::session_table::Counters;
 use super::{Store, codec};
 use crate::campaign::plan::SMALL;
 use crate::campaign::recheck::recheck;
-use crate::campaign::verdict::{Judgement, Verdict};
+use crate::campaign::verdict::Verdict;
 use crate::device::channels::ChannelMap;
 use crate::device::samples::{ChannelSamples, SampleType, Samples};
 use crate::device::stream::Recording;
 use crate::spectra::{CrossSpectra, Pulse, Summing, Windowing};
 use jointrig_protocol::channel::{Axis, Channel, Quantity, Role};
-use jointrig_protocol::shot::{Phase, Shot};
 use num_complex::Complex;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
@@ -43,53 +42,19 @@ fn map(full_scale: [f64; 2], bits: u8) -> ChannelMap {
 }
 
 fn session(store: &mut Store, map: &ChannelMap) -> i64 {
-    let text = || "x".to_owned();
-    let info = SessionInfo {
-        address: text(),
-        board: text(),
-        serial: text(),
-        firmware_version: text(),
-        target: text(),
-        build: Hex(1),
-        schema_hash: Hex(2),
-    };
-    store.begin_session(&info, map).expect("noted")
+    store.begin_session(&info(), map).expect("noted")
 }
 
+/// A good record without gaps.
 fn record(attempt: u32, session: i64, samples: Samples) -> NewRecord {
-    let shot = Shot {
-        number: attempt + 1,
-        phase: Phase::Done,
-        fired_at: 10,
-        trigger: 400,
-        pulse_us: 3_000,
-        peak_n: 49.3,
-        width_us: 270.1,
-        rebound_ratio: 0.1,
-        rebound_after: 3,
-        friction_peak_n: 17.0,
-        quiet_ratio: 0.3,
-    };
-    let recording = Recording { epoch: 3, first_scan: 144, trigger_index: 0, samples, gaps: vec![], shot };
-    let verdict = Judgement::without_pulse(Verdict::Good, 0.1, 0.02, "because".into());
-    NewRecord {
-        cell: 1,
-        attempt,
-        session,
-        utc: "2026-01-01T00:00:00Z".into(),
-        utc_error_s: None,
-        recording,
-        verdict,
-    }
+    let mut new = tests::record(1, attempt, session, Verdict::Good);
+    new.recording = Recording { trigger_index: 0, samples, gaps: vec![], ..new.recording };
+    new
 }
 
 fn folder() -> tempfile::TempDir {
     // in memory if there is such a folder: otherwise the transactions wait for a disk
     tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).expect("a folder")
-}
-
-fn rows(store: &Store) -> Vec<RecordRow> {
-    store.records().expect("rows").into_iter().collect::<Result<_, _>>().expect("whole")
 }
 
 #[test]
