@@ -8,6 +8,7 @@
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::watch::{Seen, Shaking, Standing, Watch};
+use jointrig::device::samples::Samples;
 use jointrig::device::stream::Accounts;
 use jointrig::device::tap::tap;
 use jointrig::live::watcher::{room, watcher};
@@ -66,7 +67,7 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
     let cells = store.cells().unwrap();
     let (watcher, ear) = watcher();
     let mut cycles = room();
-    let codes = vec![1_i16; 51_200];
+    let samples = Samples::of_codes(&vec![1; 51_200], 10);
     let used = allocated(|| {
         for attempts in 0..5_000 {
             let (row, standing) = (&cells[0], Standing { kept: 1, attempts });
@@ -79,7 +80,7 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
                 amplitude: 1e-7,
                 drive_v: 0.1,
                 settled: false,
-                codes: &codes,
+                samples: &samples,
             }));
             // messages are received now and then; most of the time the queue is full
             if attempts % 100 == 0 {
@@ -88,5 +89,5 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
         }
     });
     assert_eq!(used, 0, "bytes for the watcher");
-    assert_eq!(cycles.len(), codes.len());
+    assert_eq!(cycles.len(), 51_200);
 }

@@ -245,7 +245,7 @@ impl<'s> Past<'s> {
             let what = format!("level {} has more or fewer channels than its session", level.id);
             return Err(self.store.content(what));
         }
-        let measured = |map: &ChannelMap| Meter::of_record(map, level.held, level.frequency_hz, &samples);
+        let measured = |map: &ChannelMap| Meter::new(map, level.held, level.frequency_hz).amplitude(&samples);
         Ok(Some(maps.iter().map(measured).collect()))
     }
 }

@@ -11,6 +11,7 @@ use super::plan::level::Level;
 use super::store::cell_table::CellRow;
 use super::verdict::Judgement;
 use crate::device::channels::ChannelMap;
+use crate::device::samples::Samples;
 use crate::device::stream::Accounts;
 
 /// An observer.
@@ -138,8 +139,8 @@ pub struct Shaking<'a> {
     pub drive_v: f64,
     /// Whether it has settled.
     pub settled: bool,
-    /// Codes of these cycles, interleaved scan by scan.
-    pub codes: &'a [i16],
+    /// The samples of these cycles.
+    pub samples: &'a Samples,
 }
 
 /// All observers.

@@ -11,6 +11,7 @@ use super::channels::ChannelMap;
 use super::claims;
 use super::error::DeviceError;
 use super::inbox::Starting;
+use super::samples::Samples;
 use super::session::{Session, TRIES, patience};
 use super::stream::{Accounts, Stream};
 use super::tap::Tap;
@@ -296,8 +297,8 @@ impl Session {
         stream.map(Stream::expected).ok_or_else(|| DeviceError::NoStream { address: self.address.clone() })
     }
 
-    /// The codes of `range` (one scan after another) and its gaps; see [`Stream::cut`].
-    pub fn cut(&self, range: Range<u64>) -> Result<(Vec<i16>, Vec<Range<usize>>), DeviceError> {
+    /// The samples of each channel in `range`, and its gaps; see [`Stream::cut`].
+    pub fn cut(&self, range: Range<u64>) -> Result<(Samples, Vec<Range<usize>>), DeviceError> {
         let stream = self.inbox.stream.as_ref();
         stream
             .map(|stream| stream.cut(range))

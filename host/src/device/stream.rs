@@ -4,7 +4,9 @@
 //! names the missing scans, so that the session can request them; scans that the device reports as
 //! lost for good are recorded as a lost range, and the stream continues after it.
 //!
-//! A record: the raw samples of every channel around one impact. A device's are 16-bit codes.
+//! Up to here codes are kept one scan after another, as the link delivers them. [`Stream::cut`] takes
+//! a part of the stream out of it one channel after another, as everything above uses it; a
+//! [`Recording`] is the part around one impact.
 
 use super::samples::{ChannelView, Samples};
 use super::tap::Tap;
@@ -272,10 +274,11 @@ impl Stream {
         }
     }
 
-    /// The codes of `range`, one scan after another, and the missing scans as index ranges into it;
-    /// their codes are 0.
-    pub fn cut(&self, range: Range<u64>) -> (Vec<i16>, Vec<Range<usize>>) {
-        let mut codes = vec![0; (range.end - range.start) as usize * self.channels];
+    /// The samples of each channel in `range`, and the missing scans as index ranges into it; their
+    /// samples are 0.
+    pub fn cut(&self, range: Range<u64>) -> (Samples, Vec<Range<usize>>) {
+        let scans = (range.end - range.start) as usize;
+        let mut codes = vec![0; scans * self.channels];
         let there = range.start.max(self.tape_first)..range.end.min(self.expected);
         let mut gaps = Vec::new();
         let mut gap = |missing: Range<u64>| {
@@ -286,7 +289,7 @@ impl Stream {
         };
         if there.start >= there.end {
             gap(range.clone());
-            return (codes, gaps);
+            return (Samples::of_codes(&codes, self.channels), gaps);
         }
         gap(range.start..there.start);
         for lost in &self.lost {
@@ -295,9 +298,12 @@ impl Stream {
         gap(there.end..range.end);
         let from = (there.start - self.tape_first) as usize * self.channels;
         let to = (there.end - self.tape_first) as usize * self.channels;
-        let at = (there.start - range.start) as usize * self.channels;
-        codes[at..at + to - from].copy_from_slice(&self.tape[from..to]);
-        (codes, gaps)
+        let at = (there.start - range.start) as usize;
+        for channel in 0..self.channels {
+            let own = self.tape[from..to].iter().skip(channel).step_by(self.channels);
+            codes[channel * scans + at..].iter_mut().zip(own).for_each(|(code, own)| *code = *own);
+        }
+        (Samples::of_codes(&codes, self.channels), gaps)
     }
 }
 
@@ -330,29 +336,6 @@ impl Recording {
     }
 }
 
-/// Reorders codes from one scan after another, as the link delivers them, to one channel after
-/// another.
-pub fn by_channel(scan_major: &[i16], channels: usize) -> Samples {
-    let mut out = Vec::with_capacity(scan_major.len());
-    for place in 0..channels {
-        out.extend(scan_major.iter().skip(place).step_by(channels));
-    }
-    Samples::of_codes(&out, channels)
-}
-
 #[cfg(test)]
 #[path = "stream_tests.rs"]
 mod tests;
-
-#[cfg(test)]
-mod recording_tests {
-    use super::*;
-
-    #[test]
-    fn scans_are_turned_into_channels() {
-        let samples = by_channel(&[1, 10, 2, 20, 3, 30], 2);
-        assert_eq!(samples.channel(0), ChannelView::I16(&[1, 2, 3]));
-        assert_eq!(samples.channel(1), ChannelView::I16(&[10, 20, 30]));
-        assert_eq!((by_channel(&[], 4).channels(), by_channel(&[], 4).scans()), (4, 0));
-    }
-}

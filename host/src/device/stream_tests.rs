@@ -21,8 +21,9 @@ fn give(stream: &mut Stream, first: u64, scans: u8, flags: u8) -> bool {
     stream.take(&Block::from_payload(&block(first, scans, flags)).expect("whole scans"))
 }
 
-fn codes(range: Range<u64>) -> Vec<i16> {
-    range.flat_map(codes_of).collect()
+fn samples(range: Range<u64>) -> Samples {
+    let of = |channel: usize| range.clone().map(move |scan| codes_of(scan)[channel]);
+    Samples::of_codes(&(0..CHANNELS).flat_map(of).collect::<Vec<i16>>(), CHANNELS)
 }
 
 #[test]
@@ -42,7 +43,7 @@ fn gaps_are_named_filled_and_counted() {
     let accounts = stream.accounts();
     assert_eq!((accounts.received, accounts.recovered, accounts.duplicates), (12, 8, 4));
     assert_eq!(accounts.unexplained(), 0);
-    assert_eq!(stream.cut(100..120), (codes(100..120), vec![]));
+    assert_eq!(stream.cut(100..120), (samples(100..120), vec![]));
 }
 
 #[test]
@@ -62,8 +63,11 @@ fn what_is_gone_is_a_range_and_the_stream_goes_on() {
     assert_eq!(stream.accounts().unexplained(), 0);
     let (cut, gaps) = stream.cut(2..26);
     assert_eq!(gaps, [2..10, 18..22, 22..24]);
-    assert_eq!(cut[..4], codes(2..4));
-    assert_eq!(cut[20..36], codes(12..20));
+    for channel in 0..CHANNELS {
+        let (early, late) = (samples(2..4), samples(12..20));
+        assert_eq!(cut.channel(channel).part(0, 2), early.channel(channel));
+        assert_eq!(cut.channel(channel).part(10, 18), late.channel(channel));
+    }
 }
 
 #[test]
@@ -73,7 +77,7 @@ fn overlapping_blocks_give_each_scan_once() {
     give(&mut stream, 6, 4, RESENT);
     give(&mut stream, 0, 7, RESENT);
     assert_eq!(stream.expected(), 16);
-    assert_eq!(stream.cut(0..16), (codes(0..16), vec![]));
+    assert_eq!(stream.cut(0..16), (samples(0..16), vec![]));
     stream.note_tail(16, true);
     assert_eq!(stream.accounts().unexplained(), 0);
 }
@@ -110,5 +114,5 @@ fn forgetting_keeps_what_is_still_wanted() {
     }
     stream.forget_before(300);
     assert!(stream.tape.len() < 800);
-    assert_eq!(stream.cut(300..400).0, codes(300..400));
+    assert_eq!(stream.cut(300..400).0, samples(300..400));
 }

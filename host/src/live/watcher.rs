@@ -11,13 +11,13 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use crate::campaign::plan::level::Level;
 use crate::campaign::watch::{Seen, Watch};
 use crate::device::channels::ChannelMap;
+use crate::device::samples::{ChannelView, Samples};
 use crate::device::stream::Accounts;
 
 /// Length of the queue of reports.
 const QUEUE: usize = 256;
 
-/// Most codes kept of a level's cycles: at least a quarter of a second of sixteen channels. More
-/// are dropped.
+/// Most codes kept of a level's cycles: at least a quarter of a second of sixteen channels.
 const MOST_CODES: usize = 1 << 18;
 
 /// One report.
@@ -77,7 +77,7 @@ pub enum WatchReport {
 /// The newest cycles of a level.
 #[derive(Debug, Default)]
 pub struct Cycles {
-    /// Codes, one scan after another.
+    /// Codes, one channel after another.
     pub codes: Vec<i16>,
     /// Whether they have not been read yet.
     pub fresh: bool,
@@ -127,14 +127,20 @@ impl Watcher {
         let _ = self.queue.try_send(told);
     }
 
-    fn keep(&self, codes: &[i16]) {
+    fn keep(&self, samples: &Samples) {
         let mut cycles = match self.cycles.try_lock() {
             Ok(cycles) => cycles,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => return,
         };
         cycles.codes.clear();
-        cycles.codes.extend_from_slice(&codes[..codes.len().min(MOST_CODES)]);
+        // the buffer never grows: of a longer window the last scans are kept
+        let kept = samples.scans().min(MOST_CODES / samples.channels().max(1));
+        for place in 0..samples.channels() {
+            if let ChannelView::I16(codes) = samples.channel(place) {
+                cycles.codes.extend_from_slice(&codes[codes.len() - kept..]);
+            }
+        }
         cycles.fresh = true;
     }
 }
@@ -166,7 +172,7 @@ impl Watch for Watcher {
                 self.tell(WatchReport::Level { level: *level, limits, most_drive_v, load_cells });
             }
             Seen::Shaking(shaking) => {
-                self.keep(shaking.codes);
+                self.keep(shaking.samples);
                 self.tell(WatchReport::Window(
                     [shaking.at_s, shaking.amplitude, shaking.drive_v],
                     shaking.settled,

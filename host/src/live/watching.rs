@@ -12,7 +12,7 @@ use super::watcher::{WatchQueue, WatchReport, room};
 use crate::campaign::plan::level::Level;
 use crate::campaign::run::shaking::record;
 use crate::device::channels::ChannelMap;
-use crate::device::stream::by_channel;
+use crate::device::samples::Samples;
 use crate::device::tap::{Envelope, NOTHING, View};
 use crate::hysteresis::RelativeMotion;
 use crate::hysteresis::cycles::closed_cycle;
@@ -220,7 +220,8 @@ impl Known {
             else {
                 continue;
             };
-            let codes = self.cycles.iter().skip(place).step_by(channels.len());
+            let scans = self.cycles.len() / channels.len();
+            let codes = self.cycles[place * scans..][..scans].iter();
             let most = codes.map(|code| code.unsigned_abs()).max().unwrap_or(0);
             let si = f64::from(most) * channels.channels[place].units_per_code().abs();
             limit.largest = limit.largest.max(si);
@@ -318,8 +319,8 @@ fn free_bytes(file: &std::path::Path) -> Option<u64> {
 /// Most points of a loop on the screen.
 const POINTS: usize = 180;
 
-/// Relative displacement (µm) and force (N) over the last whole cycle in these codes (one scan
-/// after another); `None` where a channel or a cycle is missing, or during a sweep.
+/// Relative displacement (µm) and force (N) over the last whole cycle in these codes (one
+/// channel after another); `None` where a channel or a cycle is missing, or during a sweep.
 pub fn turn(
     channels: &ChannelMap,
     load_cells: &[(usize, f64)],
@@ -335,7 +336,8 @@ pub fn turn(
         return None;
     }
     let from = scans - cycle - 2 * spare;
-    let samples = by_channel(&codes[from * count..scans * count], count);
+    let last: Vec<i16> = codes.chunks_exact(scans).flat_map(|channel| &channel[from..]).copied().collect();
+    let samples = Samples::of_codes(&last, count);
     let record = record(channels, load_cells, &samples, level).ok()?;
     let RelativeMotion::Velocity { a_m_per_s, b_m_per_s } = &record.motion else { return None };
     let length = a_m_per_s.len().min(b_m_per_s.len()).min(record.force_n.len());
@@ -388,16 +390,16 @@ mod tests {
         let omega = TAU * 100.0;
         let code =
             |place: usize, value: f64| (value / channels.channels[place].units_per_code()).round() as i16;
-        let codes: Vec<i16> = (0..5_120)
-            .flat_map(|scan| {
-                let (sin, cos) = (omega * f64::from(scan) / 51_200.0).sin_cos();
-                [
-                    code(0, 1.5e-6 * omega * cos),
-                    code(1, -0.5e-6 * omega * cos),
-                    code(2, 3.0 + 30.0 * sin + 5.0 * cos),
-                ]
-            })
-            .collect();
+        let codes = |scans: i32| -> Vec<i16> {
+            let of = |place: usize| {
+                (0..scans).map(move |scan| {
+                    let (sin, cos) = (omega * f64::from(scan) / 51_200.0).sin_cos();
+                    [1.5e-6 * omega * cos, -0.5e-6 * omega * cos, 3.0 + 30.0 * sin + 5.0 * cos][place]
+                })
+            };
+            (0..3).flat_map(|place| of(place).map(move |value| code(place, value))).collect()
+        };
+        let (few, codes) = (codes(512), codes(5_120));
         let [x, force] = turn(&channels, &[(2, 1.0)], &codes, &level).expect("whole cycles");
         assert_eq!(x.len(), force.len());
         let most = |all: &[f64]| all.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -406,7 +408,7 @@ mod tests {
         // at the largest x the force is the elastic part, at zero x the dissipative one
         let middle = x.iter().zip(&force).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).expect("points");
         assert!((middle.1.abs() - 5.0).abs() < 1.5, "{middle:?}");
-        assert_eq!(turn(&channels, &[(2, 1.0)], &codes[..3 * 512], &level), None, "not a cycle and its ends");
+        assert_eq!(turn(&channels, &[(2, 1.0)], &few, &level), None, "not a cycle and its ends");
         assert_eq!(turn(&channels, &[(2, 1.0)], &codes, &Level { end_hz: Some(200.0), ..level }), None);
     }
 }

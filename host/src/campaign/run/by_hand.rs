@@ -14,7 +14,6 @@ use super::shot::{Outcome, QuietLimits, STEPS_PER_RING, Shooter, no_shot};
 use crate::campaign::watch::{Seen, Watchers};
 use crate::device::channels::ChannelMap;
 use crate::device::error::DeviceError;
-use crate::device::samples::ChannelView;
 use crate::device::session::Session;
 
 /// Time over which the motion before a hit is measured, s: two periods of the slowest mode of
@@ -75,7 +74,7 @@ impl Shooter {
         session.wait_for(end)?;
         self.ready_at = end;
         let clear = trigger - ((CLEAR_S * self.rate_hz) as u64).min(trigger - begin);
-        let moved = self.moving(session, channels, quiet, clear.saturating_sub(before).max(begin)..clear)?;
+        let moved = moving(session, channels, quiet, clear.saturating_sub(before).max(begin)..clear)?;
         let recording = Box::new(self.collect(session, &self.struck(session, channels, trigger)?)?);
         session.forget_before(end.saturating_sub(self.pre.max(before)));
         Ok(match moved {
@@ -93,29 +92,10 @@ impl Shooter {
     ) -> Result<Option<u64>, DeviceError> {
         let Some(force) = channels.place(Role::HammerForce) else { return Ok(None) };
         let level_n = f64::from(self.trigger.level_n);
-        let (codes, _) = session.cut(range.clone())?;
-        let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[force]).collect();
-        let found =
-            channels.to_si(force, ChannelView::I16(&own)).iter().position(|force_n| *force_n >= level_n);
+        let (samples, _) = session.cut(range.clone())?;
+        let force_n = channels.to_si(force, samples.channel(force));
+        let found = force_n.iter().position(|force_n| *force_n >= level_n);
         Ok(found.map(|scan| range.start + scan as u64))
-    }
-
-    /// The channel with the largest ratio of motion to its limit, and that ratio; `None` if no
-    /// channel exceeds its limit.
-    fn moving(
-        &self,
-        session: &Session,
-        channels: &ChannelMap,
-        quiet: &QuietLimits,
-        range: Range<u64>,
-    ) -> Result<Option<(usize, f64)>, DeviceError> {
-        let (codes, _) = session.cut(range)?;
-        let ratio = |(place, limit): (usize, &f32)| {
-            let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[place]).collect();
-            (place, rms_of_means(&channels.to_si(place, ChannelView::I16(&own))) / f64::from(*limit))
-        };
-        let bounded = quiet.iter().enumerate().filter(|(_, limit)| **limit > 0.0);
-        Ok(bounded.map(ratio).filter(|(_, ratio)| *ratio > 1.0).max_by(|a, b| a.1.total_cmp(&b.1)))
     }
 
     /// The shot summary that a device would report for this hit.
@@ -124,14 +104,29 @@ impl Shooter {
         let peak_n = match channels.place(Role::HammerForce) {
             None => 0.0,
             Some(force) => {
-                let (codes, _) = session.cut(listened)?;
-                let own: Vec<i16> = codes.chunks_exact(self.channels).map(|scan| scan[force]).collect();
-                channels.to_si(force, ChannelView::I16(&own)).into_iter().fold(0.0, f64::max)
+                let (samples, _) = session.cut(listened)?;
+                channels.to_si(force, samples.channel(force)).into_iter().fold(0.0, f64::max)
             }
         };
         let none = no_shot(self.number, 0);
         Ok(Shot { phase: Phase::Done, fired_at: trigger, trigger, peak_n: peak_n as f32, ..none })
     }
+}
+
+/// The channel with the largest ratio of motion to its limit, and that ratio; `None` if no
+/// channel exceeds its limit.
+fn moving(
+    session: &Session,
+    channels: &ChannelMap,
+    quiet: &QuietLimits,
+    range: Range<u64>,
+) -> Result<Option<(usize, f64)>, DeviceError> {
+    let (samples, _) = session.cut(range)?;
+    let ratio = |(place, limit): (usize, &f32)| {
+        (place, rms_of_means(&channels.to_si(place, samples.channel(place))) / f64::from(*limit))
+    };
+    let bounded = quiet.iter().enumerate().filter(|(_, limit)| **limit > 0.0);
+    Ok(bounded.map(ratio).filter(|(_, ratio)| *ratio > 1.0).max_by(|a, b| a.1.total_cmp(&b.1)))
 }
 
 /// Rms of the means of neighbouring samples about their overall mean: slow motion, without offset

@@ -152,7 +152,7 @@ pub fn run(
     }
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
     let (epoch, _) = session.start(channels.len())?;
-    let shooter = Shooter::new(session, &plan, epoch, channels.len())?;
+    let shooter = Shooter::new(session, &plan, epoch)?;
     let simulated = is_simulated_board(&info.board);
     options.watch.saw(&Seen::Stream { channels: &channels, simulated });
     options.watch.saw(&Seen::Begun { wanted: tally.wanted(), kept: tally.kept() });

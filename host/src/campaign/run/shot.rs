@@ -18,7 +18,7 @@ use crate::campaign::plan::Plan;
 use crate::campaign::watch::{Seen, Watchers};
 use crate::device::error::DeviceError;
 use crate::device::session::Session;
-use crate::device::stream::{Recording, by_channel};
+use crate::device::stream::Recording;
 
 /// Scans between the furthest scan that the device can have reached and the scan requested from it.
 const MARGIN: u64 = 1_024;
@@ -72,7 +72,6 @@ pub type QuietLimits = Vec<f32>;
 /// Fires shots on a running stream.
 pub struct Shooter {
     pub(super) ring: u64,
-    pub(super) channels: usize,
     epoch: u32,
     pub(super) pre: u64,
     pub(super) post: u64,
@@ -85,12 +84,11 @@ pub struct Shooter {
 }
 
 impl Shooter {
-    /// Configures the device for the plan's hits. `epoch` is that of the running stream, which has
-    /// `channels` channels.
+    /// Configures the device for the plan's hits. `epoch` is that of the running stream.
     ///
     /// # Errors
     /// The device refuses or is disconnected.
-    pub fn new(session: &mut Session, plan: &Plan, epoch: u32, channels: usize) -> Result<Self, DeviceError> {
+    pub fn new(session: &mut Session, plan: &Plan, epoch: u32) -> Result<Self, DeviceError> {
         let (record, settle, times) = (plan.record.get_ref(), plan.settle.get_ref(), plan.trigger.get_ref());
         let rate_hz = f64::from(record.rate_hz);
         let scans = |seconds: f64| (seconds * rate_hz).round() as u32;
@@ -105,7 +103,6 @@ impl Shooter {
         session.hold_acknowledgement(Some(session.expected()?));
         Ok(Self {
             ring: session.ring_scans(),
-            channels,
             epoch,
             pre: u64::from(record.pre_trigger_scans),
             post: plan.post_trigger_scans(),
@@ -252,12 +249,12 @@ impl Shooter {
     /// Cuts the record of a hit whose last scan has arrived.
     pub(super) fn collect(&self, session: &Session, shot: &Shot) -> Result<Recording, DeviceError> {
         let first_scan = shot.trigger.saturating_sub(self.pre);
-        let (codes, gaps) = session.cut(first_scan..shot.trigger + self.post)?;
+        let (samples, gaps) = session.cut(first_scan..shot.trigger + self.post)?;
         Ok(Recording {
             epoch: self.epoch,
             first_scan,
             trigger_index: (shot.trigger - first_scan) as usize,
-            samples: by_channel(&codes, self.channels),
+            samples,
             gaps,
             shot: *shot,
         })

@@ -6,6 +6,7 @@ use std::time::Duration;
 use crate::scripted_device::fake::{Fake, RING};
 use crate::scripted_device::faulty::{Faults, Faulty};
 use jointrig::device::logs::Tables;
+use jointrig::device::samples::Samples;
 use jointrig::device::session::Session;
 use jointrig::device::stream::Accounts;
 use jointrig::device::transport::Transport;
@@ -20,7 +21,7 @@ fn open(transport: impl Transport + 'static) -> Session {
 }
 
 /// Streams, fires once, and returns the samples around the trigger and the final counts.
-fn measure(transport: impl Transport + 'static) -> (Vec<i16>, Accounts, u64) {
+fn measure(transport: impl Transport + 'static) -> (Samples, Accounts, u64) {
     let mut session = open(transport);
     let info = session.info().expect("info");
     let map = session.channels(&info).expect("channels");
@@ -42,10 +43,10 @@ fn measure(transport: impl Transport + 'static) -> (Vec<i16>, Accounts, u64) {
     let status = session.status().expect("status");
     let trigger = status.shot.expect("a shot").trigger;
     session.wait_for(trigger + 40_000).expect("scans");
-    let (codes, gaps) = session.cut(trigger - 256..trigger + 40_000).expect("a stream");
+    let (samples, gaps) = session.cut(trigger - 256..trigger + 40_000).expect("a stream");
     assert!(gaps.is_empty(), "{gaps:?}");
     let accounts = session.finish().expect("the end");
-    (codes, accounts, session.frames().1)
+    (samples, accounts, session.frames().1)
 }
 
 #[test]

@@ -4,19 +4,16 @@
 //! The shaker moves only as long as a host requests it: an order is valid for ten seconds of the
 //! device's clock and is renewed every three (`order`); an interrupt, an error and the end of the
 //! session bring the shaker to rest. Levels that are already in the file are skipped, so an
-//! interrupted run is resumed by running it again.
+//! interrupted run is resumed by running it again. [`ChannelLimits`] are the values above which the
+//! device stops the shaker itself.
 //!
-//! Measures the amplitude of the controlled quantity from the samples, and decides whether it has
-//! settled.
+//! A level is recorded once [`Meter`] reads the ordered amplitude in several windows in a row
+//! ([`is_settled`]). In a sweep, the frequency changes in small steps with continuous phase; its
+//! record spans from rest to rest, so that the ratio of its spectra is the structure's FRF,
+//! independent of the sweep rate and of the steps.
 //!
-//! A stored level as a hysteresis record: only scales, sums and delays are applied.
-//!
-//! A sweep: the frequency changes in small steps with continuous phase.
-//!
-//! The record of a sweep spans from rest to rest, so that the ratio of its spectra is the
-//! structure's FRF, independent of the sweep rate and of the steps.
-//!
-//! How levels are measured, and the limits that stop the shaker.
+//! [`record()`] turns a stored level into a hysteresis record: only scales, sums and delays are
+//! applied.
 
 use super::answers::Edits;
 use super::pulse::with_sensors;
@@ -30,13 +27,12 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::watch::{Seen, Shaking, Watchers};
 use crate::device::channels::ChannelMap;
-use crate::device::samples::{SampleType, Samples};
+use crate::device::samples::{ChannelView, Samples};
 use crate::device::session::Session;
-use crate::device::stream::by_channel;
 use crate::hysteresis::record::in_step;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
 use jointrig_protocol::answer::Info;
-use jointrig_protocol::channel::{Quantity, Role};
+use jointrig_protocol::channel::{Channel, Quantity, Role};
 use jointrig_protocol::request::{Configuration, Stage as StageRequest};
 use num_complex::Complex;
 use order::Orders;
@@ -199,15 +195,15 @@ pub fn run_watched(
 }
 
 /// The first channel at the contact with a code at the end of its range.
-fn clipped(channels: &ChannelMap, codes: &[i16]) -> Option<String> {
+fn clipped(channels: &ChannelMap, samples: &Samples) -> Option<String> {
     let at_contact = |place: &usize| {
         matches!(channels.channels[*place].role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell)
     };
-    let full = |code: &i16| matches!(*code, i16::MIN | i16::MAX);
-    (0..channels.len())
-        .filter(at_contact)
-        .find(|place| codes.iter().skip(*place).step_by(channels.len()).any(full))
-        .map(|place| channels.channels[place].name.to_string())
+    let full = |place: &usize| match samples.channel(*place) {
+        ChannelView::I16(codes) => codes.iter().any(|code| matches!(*code, i16::MIN | i16::MAX)),
+        _ => false,
+    };
+    (0..channels.len()).filter(at_contact).find(full).map(|place| channels.channels[place].name.to_string())
 }
 
 /// Selects the assembly on a virtual rig.
@@ -286,7 +282,7 @@ impl Bench<'_> {
         let first_scan = taken.first_scan;
         // the ramp down to rest is part of a sweep's record
         let end = if level.end_hz.is_some() { self.session.expected()? } else { first_scan + taken.scans };
-        let (codes, gaps) = self.session.cut(first_scan..end)?;
+        let (samples, gaps) = self.session.cut(first_scan..end)?;
         let new = NewLevel {
             session: self.session_id,
             moment: self.options.moment,
@@ -294,7 +290,7 @@ impl Bench<'_> {
             settled: taken.settled,
             epoch: self.epoch,
             first_scan,
-            samples: by_channel(&codes, self.channels.len()),
+            samples,
             gaps,
         };
         let id = store.insert_level(&new)?;
@@ -325,17 +321,17 @@ impl Bench<'_> {
                 }));
             }
             orders.go_on(self.session, at + window)?;
-            let (codes, gaps) = self.session.cut(at..at + window)?;
+            let (samples, gaps) = self.session.cut(at..at + window)?;
             at += window;
             if gaps.is_empty() {
-                let amplitude = meter.amplitude(&codes, self.channels.len());
+                let amplitude = meter.amplitude(&samples);
                 amplitudes.push(amplitude);
                 onlookers.watch.saw(&Seen::Shaking(Shaking {
                     at_s: (at - begun) as f64 / self.rate_hz(),
                     amplitude,
                     drive_v: f64::from(self.session.status()?.drive_v),
                     settled: is_settled(&amplitudes, target),
-                    codes: &codes,
+                    samples: &samples,
                 }));
             }
             if level.end_hz.is_none() {
@@ -356,11 +352,11 @@ impl Bench<'_> {
         let scans = (cycles * self.rate_hz() / level.frequency_hz).ceil() as u64 + 1;
         orders.go_on(self.session, at + scans)?;
         orders.still_runs(self.session)?;
-        let (codes, _) = self.session.cut(at..at + scans)?;
-        if let Some(channel) = clipped(self.channels, &codes) {
+        let (samples, _) = self.session.cut(at..at + scans)?;
+        if let Some(channel) = clipped(self.channels, &samples) {
             return Err(ShakeError::Short(Shortfall::Clipped { channel }));
         }
-        let moved = meter.amplitude(&codes, self.channels.len());
+        let moved = meter.amplitude(&samples);
         // the meter measures the motion; with an open-loop drive the reached amplitude is that of
         // the drive
         let reached = if target.is_some() { moved } else { drive_v };
@@ -428,9 +424,16 @@ pub fn is_settled(amplitudes: &[f64], target: Option<f64>) -> bool {
         && (mean(late) - mean(early)).abs() < DRIFT * level
 }
 
-/// One term of the measured quantity: index in the scan, SI units per code, and the phase
-/// correction for its delay.
-type Term = (usize, Complex<f64>);
+/// One term of the measured quantity.
+struct Term {
+    /// Index in the scan.
+    place: usize,
+    channel: Channel,
+    /// From the channel's SI unit to that of the quantity.
+    gain: f64,
+    /// Phase correction for the channel's delay, rad.
+    phase: f64,
+}
 
 /// A lock-in amplifier for the controlled quantity.
 pub struct Meter {
@@ -441,20 +444,15 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Creates a meter for the codes of this device; with an open-loop drive, it measures the
-    /// specimens' relative displacement to determine whether the structure has settled.
+    /// Creates a meter for these channels; with an open-loop drive, it measures the specimens'
+    /// relative displacement to determine whether the structure has settled.
     pub fn new(channels: &ChannelMap, held: Held, frequency_hz: f64) -> Self {
-        Self::of(channels, held, frequency_hz, |_| SampleType::I16)
-    }
-
-    /// As [`Meter::new`], for channels of these types.
-    fn of(channels: &ChannelMap, held: Held, frequency_hz: f64, types: impl Fn(usize) -> SampleType) -> Self {
         let omega = TAU * frequency_hz;
         let term = |role: Role, gain: f64| {
             channels.place(role).map(|place| {
-                let channel = &channels.channels[place];
-                let late_s = f64::from(channel.delay_ns) * 1e-9;
-                (place, Complex::from_polar(gain * types(place).units(channel), omega * late_s))
+                let channel = channels.channels[place].clone();
+                let phase = omega * (f64::from(channel.delay_ns) * 1e-9);
+                Term { place, channel, gain, phase }
             })
         };
         let terms = match held {
@@ -478,36 +476,23 @@ impl Meter {
         (cycles * self.cycle_scans).round() as u64
     }
 
-    /// Amplitude in these codes (interleaved scan by scan): m for velocities, N for a force.
-    pub fn amplitude(&self, codes: &[i16], channels: usize) -> f64 {
-        self.over(codes.len() / channels, |place, scan| f64::from(codes[scan * channels + place]))
-    }
-
-    /// Amplitude of a stored level, in the same units.
-    pub fn of_record(channels: &ChannelMap, held: Held, frequency_hz: f64, samples: &Samples) -> f64 {
-        let meter = Self::of(channels, held, frequency_hz, |place| samples.channel(place).of());
-        let mut values = vec![Vec::new(); samples.channels()];
-        for (place, _) in &meter.terms {
-            values[*place].clear();
-            samples.channel(*place).scaled(1.0, &mut values[*place]);
-        }
-        meter.over(samples.scans(), |place, scan| values[place][scan])
-    }
-
-    /// The amplitude from the sample of a channel in a scan.
-    fn over(&self, scans: usize, sample: impl Fn(usize, usize) -> f64) -> f64 {
+    /// The amplitude over the whole cycles in these samples: m for velocities, N for a force.
+    pub fn amplitude(&self, samples: &Samples) -> f64 {
+        let scans = samples.scans();
         let cycles = (scans as f64 / self.cycle_scans).floor();
         let whole = ((cycles * self.cycle_scans).round() as usize).min(scans);
         let sum: Complex<f64> = self
             .terms
             .iter()
-            .map(|(place, unit)| {
-                let at = |scan: usize| sample(*place, scan);
-                let mean = (0..whole).map(at).sum::<f64>() / whole.max(1) as f64;
+            .map(|Term { place, channel, gain, phase }| {
+                let own = samples.channel(*place);
+                let mut values = Vec::new();
+                own.scaled(1.0, &mut values);
+                let mean = values[..whole].iter().sum::<f64>() / whole.max(1) as f64;
                 let tone: Complex<f64> = (0..whole)
-                    .map(|scan| Complex::cis(-self.turn_per_scan * scan as f64) * (at(scan) - mean))
+                    .map(|scan| Complex::cis(-self.turn_per_scan * scan as f64) * (values[scan] - mean))
                     .sum();
-                unit * tone
+                Complex::from_polar(gain * own.of().units(channel), *phase) * tone
             })
             .sum();
         2.0 * sum.norm() / whole.max(1) as f64
@@ -701,23 +686,21 @@ mod tests {
                 let t = scan as f64 / 51_200.0 - f64::from(channel.delay_ns) * 1e-9;
                 (amplitude * omega * (omega * t + phase).cos() / channel.units_per_code()).round() as i16
             };
-            let codes: Vec<i16> = (0..scans)
-                .flat_map(|scan| [velocity(0, 2e-7, 0.0, scan), velocity(1, 1e-7, TAU / 6.0, scan), 0])
-                .collect();
-            let got = meter.amplitude(&codes, 3);
-            assert!((got / (3f64.sqrt() * 1e-7) - 1.0).abs() < 1e-3, "{frequency_hz} Hz: {got}");
-            assert_eq!(Meter::new(&map, Held::Force, frequency_hz).amplitude(&codes, 3), 0.0);
-            // the stored level gives the same number, and in SI units one as near
-            let stored = by_channel(&codes, 3);
-            let of = |map: &ChannelMap, samples: &Samples| {
-                Meter::of_record(map, Held::Displacement, frequency_hz, samples)
+            let of = |place: usize, amplitude: f64, phase: f64| {
+                ChannelSamples::I16((0..scans).map(|scan| velocity(place, amplitude, phase, scan)).collect())
             };
-            assert_eq!(of(&map, &stored), got);
-            let si = (0..3).map(|place| ChannelSamples::F64(map.to_si(place, stored.channel(place))));
+            let codes = [of(0, 2e-7, 0.0), of(1, 1e-7, TAU / 6.0), of(2, 0.0, 0.0)];
+            let codes = Samples::new(codes.into()).expect("equally long");
+            let got = meter.amplitude(&codes);
+            assert!((got / (3f64.sqrt() * 1e-7) - 1.0).abs() < 1e-3, "{frequency_hz} Hz: {got}");
+            assert_eq!(Meter::new(&map, Held::Force, frequency_hz).amplitude(&codes), 0.0);
+            // samples in SI units give the same but for rounding
+            let si = (0..3).map(|place| ChannelSamples::F64(map.to_si(place, codes.channel(place))));
             let si = Samples::new(si.collect()).expect("equally long");
             let mut in_si = map.clone();
             in_si.channels.iter_mut().for_each(|channel| channel.units_per_volt = 1.0);
-            assert!((of(&in_si, &si) / got - 1.0).abs() < 1e-12);
+            let in_si = Meter::new(&in_si, Held::Displacement, frequency_hz).amplitude(&si);
+            assert!((in_si / got - 1.0).abs() < 1e-12);
         }
     }
 
