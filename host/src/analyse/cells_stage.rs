@@ -6,13 +6,13 @@
 
 use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
 use super::cell::Progress;
-use super::cell::{Cell, CellName, Hit, Measurements};
+use super::cell::{CellName, Hit, Measurements};
 use super::impact_loops;
 use super::impact_loops::ImpactLoop;
 use super::missing::Missing;
 use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSignals};
 use crate::results::MAIN_BAND;
-use crate::spectra::{FrfSettings, ImpactRecords, MotionQuantity, SpectraError, Windowing, estimate};
+use crate::spectra::{Pulse, SpectraError, Summing, Windowing};
 use crate::structure::Structure;
 use crate::substructuring::averaged;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
@@ -68,9 +68,10 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     let geometry = measurements.geometry();
     let moves_contact = counts_for_contact(geometry, name);
     let (drives, damped) = (drives_the_cells(geometry, name), super::contact_answer::reads(geometry, name));
-    let (sigma_per_s, quantity) = (measurements.sigma_per_s(), measurements.quantity());
+    let sigma_per_s = measurements.sigma_per_s();
     let mut sums: Option<CellSums> = None;
-    let (mut unfit, mut kept) = (None, Cell::default());
+    let mut unfit = None;
+    let mut each = keep_hits.then(|| HitSpectra::of(name, &geometry.ajb, sigma_per_s)).flatten();
     let read = measurements.each_hit(name, moves_contact || drives || damped, &mut |hit, fs_hz| {
         // the contact signals of a hit count once, in the cell that was struck; a cell's own hits
         // come first
@@ -90,9 +91,8 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
         if unfit.is_none() {
             unfit = sums.add(hit, fs_hz).err();
         }
-        if keep_hits {
-            kept.fs_hz = fs_hz;
-            kept.hits.push(hit.clone());
+        if let Some(each) = &mut each {
+            each.add(hit, fs_hz);
         }
     });
     let left_out = match read {
@@ -101,11 +101,9 @@ fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> 
     };
     found.missing.splice(0..0, left_out.into_iter().map(records));
     let Some(sums) = sums else { return found };
-    if keep_hits {
-        match of(name, &geometry.ajb, &kept, sigma_per_s, quantity) {
-            Ok(hits) => found.hits.extend(hits),
-            Err(error) => found.missing.push(records(error.to_string())),
-        }
+    match each.map_or(Ok(None), HitSpectra::finish) {
+        Ok(hits) => found.hits.extend(hits),
+        Err(error) => found.missing.push(records(error.to_string())),
     }
     match unfit.map_or_else(|| sums.finish(), Err) {
         Ok(averaged) => found.averages.push(averaged),
@@ -132,57 +130,84 @@ fn drives_the_cells(geometry: &Geometry, name: &CellName) -> bool {
         && geometry.b.impacts.iter().any(|p| p.name == name.impact && p.grouping == Grouping::InterfaceB)
 }
 
-/// The spectra of every hit of a cell of the assembly's interface; `None` for another cell, or for
-/// a single hit.
-///
-/// # Errors
-/// Hits that cannot be transformed.
-pub fn of(
-    name: &CellName,
-    points: &Configuration,
-    cell: &Cell,
-    sigma_per_s: f64,
-    quantity: MotionQuantity,
-) -> Result<Option<averaged::CellHits>, SpectraError> {
-    let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
-    let channels: Vec<&Point> =
-        points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
-    // records hold a location's channels in the order used here
-    let all = cell.hits.iter().all(|hit| hit.response.len() == channels.len());
-    let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
-    if name.configuration != Structure::Ajb || channels.is_empty() || !all || !there || cell.hits.len() < 2 {
-        return Ok(None);
-    }
-    let (mut auto, mut cross) = (Vec::<Vec<f64>>::new(), Vec::<Vec<Vec<Complex<f64>>>>::new());
-    for hit in &cell.hits {
-        let one = ImpactRecords {
-            fs_hz: cell.fs_hz,
-            force_n: vec![hit.force_n.clone()],
-            response: vec![hit.response.clone()],
-            quantity,
-        };
-        let settings = FrfSettings {
+/// The spectra of every hit of a cell of the assembly's interface, which the replicates of the
+/// average over positions need one by one.
+struct HitSpectra<'a> {
+    name: &'a CellName,
+    /// The location's channels, in the order of a hit's responses.
+    channels: Vec<&'a Point>,
+    windowing: Windowing,
+    hits: usize,
+    /// By line, then hit.
+    auto: Vec<Vec<f64>>,
+    /// By line, then channel, then hit.
+    cross: Vec<Vec<Vec<Complex<f64>>>>,
+    /// Whether every hit had these channels.
+    complete: bool,
+    failed: Option<SpectraError>,
+}
+
+impl<'a> HitSpectra<'a> {
+    /// `None` for a cell that is not between interface points of the assembly.
+    fn of(name: &'a CellName, points: &'a Configuration, sigma_per_s: f64) -> Option<Self> {
+        let interface = |p: &&Point| matches!(p.grouping, Grouping::InterfaceA | Grouping::InterfaceB);
+        let channels: Vec<&Point> =
+            points.channels.iter().filter(interface).filter(|p| p.name == name.response).collect();
+        let there = points.impacts.iter().filter(interface).any(|p| p.name == name.impact);
+        (name.configuration == Structure::Ajb && !channels.is_empty() && there).then(|| HitSpectra {
+            name,
+            channels,
             windowing: Windowing { sigma_per_s, ..Windowing::default() },
-            delay_s: hit.response_delay_s.clone(),
-            band_hz: Some([MAIN_BAND.low_hz, MAIN_BAND.high_hz]),
-            ..FrfSettings::default()
-        };
-        let y = estimate(&one, &[true], &settings)?;
-        auto.resize(y.lines(), Vec::new());
-        cross.resize(y.lines(), vec![Vec::new(); channels.len()]);
+            hits: 0,
+            auto: Vec::new(),
+            cross: Vec::new(),
+            complete: true,
+            failed: None,
+        })
+    }
+
+    fn add(&mut self, hit: &Hit, fs_hz: f64) {
+        self.hits += 1;
+        self.complete &= hit.response.len() == self.channels.len();
+        if self.complete && self.failed.is_none() {
+            self.failed = self.spectra(hit, fs_hz).err();
+        }
+    }
+
+    fn spectra(&mut self, hit: &Hit, fs_hz: f64) -> Result<(), SpectraError> {
+        let band_hz = [MAIN_BAND.low_hz, MAIN_BAND.high_hz];
+        let outputs: Vec<&[f64]> = hit.response.iter().map(Vec::as_slice).collect();
+        let pulse = Pulse::locate(&hit.force_n).ok_or(SpectraError::NoPulse { hit: 0 })?;
+        let mut one = Summing::new(fs_hz, hit.force_n.len(), outputs.len(), self.windowing, band_hz);
+        one.add(&hit.force_n, &outputs, &pulse)?;
+        let y = one.finish(&hit.response_delay_s)?;
+        self.auto.resize(y.lines(), Vec::new());
+        self.cross.resize(y.lines(), vec![Vec::new(); self.channels.len()]);
         for l in 0..y.lines() {
-            auto[l].push(y.force(l));
-            for (axis, of_channel) in cross[l].iter_mut().enumerate() {
+            self.auto[l].push(y.force(l));
+            for (axis, of_channel) in self.cross[l].iter_mut().enumerate() {
                 of_channel.push(y.cross(l, axis));
             }
         }
+        Ok(())
     }
-    Ok(Some(averaged::CellHits {
-        input: name.impact.clone(),
-        outputs: channels.iter().map(|c| c.description.clone()).collect(),
-        auto,
-        cross,
-    }))
+
+    /// `None` for a single hit, or if a hit lacks a channel.
+    ///
+    /// # Errors
+    /// A hit that cannot be transformed.
+    fn finish(self) -> Result<Option<averaged::CellHits>, SpectraError> {
+        if !self.complete || self.hits < 2 {
+            return Ok(None);
+        }
+        self.failed.map_or(Ok(()), Err)?;
+        Ok(Some(averaged::CellHits {
+            input: self.name.impact.clone(),
+            outputs: self.channels.iter().map(|c| c.description.clone()).collect(),
+            auto: self.auto,
+            cross: self.cross,
+        }))
+    }
 }
 
 /// The response per newton of one hit that moves the contact.

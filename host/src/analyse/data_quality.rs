@@ -17,12 +17,12 @@ pub struct DataQuality {
     /// share.
     pub frequency_hz: Vec<f64>,
     /// The cells, in the order in which they were averaged.
-    pub cells: Vec<HeardCell>,
+    pub cells: Vec<CellQuality>,
 }
 
 /// Data quality of one cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeardCell {
+pub struct CellQuality {
     /// The cell.
     pub name: CellName,
     /// Coherence at [`DataQuality::frequency_hz`].
@@ -52,7 +52,7 @@ pub fn data_quality(geometry: &Geometry, cells: &[CellAverage]) -> DataQuality {
     }
 }
 
-fn one(geometry: &Geometry, cell: &CellAverage) -> HeardCell {
+fn one(geometry: &Geometry, cell: &CellAverage) -> CellQuality {
     let y = &cell.spectra;
     let axis = along_the_hit(geometry, &cell.name).min(y.outputs().saturating_sub(1));
     let several = y.hits() > 1;
@@ -62,7 +62,7 @@ fn one(geometry: &Geometry, cell: &CellAverage) -> HeardCell {
     let mut errors: Vec<f64> =
         (0..y.lines()).filter(|l| several && MAIN_BAND.contains(y.frequency_hz()[*l])).map(error).collect();
     errors.sort_by(f64::total_cmp);
-    HeardCell {
+    CellQuality {
         name: cell.name.clone(),
         coherence: lines.into_iter().map(|l| rounded(value(l), 3)).collect(),
         random_error: errors.get(errors.len() / 2).map(|e| rounded(*e, 4)),
