@@ -139,7 +139,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => flash::run(&project, detach),
-        Task::Python => python::run(&project).map(|remark| println!("{remark}")),
+        Task::Python => python::run(&project, python::Jointrig::Build).map(|remark| println!("{remark}")),
         Task::Wheels => python::run_release(&project),
         Task::Book { yes } => book::run(&project, packages::Consent::new(yes)),
         Task::Sbom => sbom::run(&project),

@@ -227,7 +227,7 @@ fn tests(run: &mut Run) -> Result<String> {
 }
 
 fn wheel(run: &mut Run) -> Result<String> {
-    python::run(run.project)
+    python::run(run.project, python::Jointrig::Built)
 }
 
 fn docs(run: &mut Run) -> Result<String> {
