@@ -24,7 +24,6 @@
 #![no_std]
 #![no_main]
 
-mod adc;
 mod channels;
 mod chips;
 mod clocks;
@@ -35,7 +34,6 @@ mod guard;
 mod inputs;
 mod keep;
 mod lights;
-mod nonce;
 mod probe;
 mod restart;
 mod rings;
@@ -134,7 +132,7 @@ async fn main(spawner: Spawner) {
     let dog = watchdog::start(p.IWDG);
     let mut without_nonce = false;
     let start = keep::count_start(|| {
-        nonce::draw().unwrap_or_else(|| {
+        keep::draw().unwrap_or_else(|| {
             without_nonce = true;
             1
         })
