@@ -38,7 +38,6 @@ pub mod processor_fault;
 pub mod pulse;
 pub mod quiet;
 pub mod receive;
-mod requests;
 pub mod ring;
 pub mod ruler;
 pub mod safety;
