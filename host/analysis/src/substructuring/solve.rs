@@ -3,10 +3,10 @@
 use super::decoupling::{DecouplingError, InverseBlock, PrimalBlock, inverse_of, observed_rank, primal_of};
 use super::decoupling::{interface, internal, internal_printed};
 use super::interface_data::{MeasuredSet, balance, scaled};
-use super::internal_dofs::Rearrangement;
 use super::method::Method;
 use super::pseudo_inverse::{condition, rank};
 use super::quality::Internals;
+use super::reduced::Rearrangement;
 use super::reduced::{MethodKind, Reduced, RefusedReason, every_line};
 use crate::Line;
 

@@ -5,7 +5,7 @@
 //! only, and the products with N⁻¹ that the fit needs are computed from these short columns. Two
 //! thirds of all nuisance parameters are such aims.
 
-use super::narrow::{MOST_LANES, add_product};
+use super::large_matrix::{MOST_LANES, add_product};
 use super::noise::{ByImpact, Whitening};
 use nalgebra::{Complex, DMatrix, DMatrixView};
 

@@ -1,7 +1,7 @@
 //! The covariance of one band's residual. Noise of a line is circular, so it is one Hermitian
 //! matrix N.
 
-use super::factor::{Factor, rows};
+use super::large_matrix::{Factor, rows};
 use crate::Line;
 use crate::substructuring::product::product;
 use nalgebra::DMatrix;
