@@ -10,7 +10,7 @@ use super::from_frfs::Substructured;
 use super::from_frfs::{Fit, NoFit, fits};
 use super::from_frfs::{Recommended, recommended};
 use super::missing::{Missing, given_up};
-use super::{cells_stage, configuration_stage, contact_stage, data_quality};
+use super::{cells_stage, chosen, configuration_stage, contact_stage};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -35,7 +35,7 @@ pub fn analyse_measurements<M: Measurements>(
         ..Findings::default()
     };
     found.missing.extend(given_up(&names, measurements.given_up()));
-    found.data_quality = data_quality::data_quality(geometry, &cells.averages);
+    found.data_quality = chosen::data_quality(geometry, &cells.averages);
 
     let place = |structure: Structure| Structure::ALL.iter().position(|s| *s == structure);
     cells.averages.sort_by_key(|average| place(average.name.configuration));
