@@ -10,7 +10,7 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::watch::{Seen, Shaking, Standing, Watch};
 use jointrig::device::stream::Accounts;
 use jointrig::device::tap::tap;
-use jointrig::live::watcher::{room, watcher};
+use jointrig::live::watching::{room, watcher};
 use peak_alloc::PeakAlloc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
