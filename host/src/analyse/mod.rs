@@ -1,9 +1,9 @@
 //! From a campaign to findings: everything is computed from the campaign file alone.
 //!
-//! Processing order: [`analyse`] opens the file ([`Measurements`] is the interface that the stages
-//! use), and `campaign.rs` calls the stages one after another: cells, configurations, results from
-//! the FRFs, the estimates to quote, the fit, the contact. Each returns its results in a separate
-//! type; together they form the [`Findings`].
+//! [`analyse`] opens the file ([`Measurements`] is the interface that the stages use), and
+//! [`analyse_measurements`] in `campaign.rs` is the whole analysis from top to bottom: cells,
+//! configurations, results from the FRFs, the estimates to quote, the fit, the contact. Each stage
+//! returns its results in a separate type; together they form the [`Findings`].
 //!
 //! Cells are read one at a time on each thread and averaged immediately, so that memory holds the
 //! signals of a few cells, never of a whole campaign. Missing data are reported in
