@@ -49,7 +49,6 @@ pub mod pseudo_inverse;
 pub mod quality;
 mod reduced;
 pub mod semm;
-mod solve;
 pub mod vpt;
 
 pub use crate::band::Band;
