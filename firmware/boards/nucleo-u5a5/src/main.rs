@@ -31,7 +31,6 @@ mod coil;
 mod dma;
 mod drive;
 mod guard;
-mod inputs;
 mod keep;
 mod lights;
 mod probe;
@@ -74,7 +73,7 @@ impl Board for Nucleo {
     type Scans = scans::Converters;
     type Coil = coil::PulseTimer;
     type Drive = drive::ShakerDrive;
-    type Inputs = inputs::Switches;
+    type Inputs = guard::Switches;
     type Source = usb::Source;
     type Sink = usb::Sink;
     type Stage = NoStage;
@@ -108,7 +107,7 @@ async fn acquisition(
     mut scans: scans::Converters,
     mut coil: coil::PulseTimer,
     mut drive: drive::ShakerDrive,
-    mut inputs: inputs::Switches,
+    mut inputs: guard::Switches,
 ) {
     acquire::acquire(core, &mut scans, &mut coil, &mut drive, &mut inputs).await;
 }
@@ -139,7 +138,7 @@ async fn main(spawner: Spawner) {
     });
 
     let coil = coil::PulseTimer::new(p.TIM1, p.PE9, p.PE15);
-    let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15, p.PF12);
+    let inputs = guard::Switches::new(p.PF13, p.PF14, p.PF15, p.PF12);
     let facts = Facts {
         board: channels::name("nucleo-u5a5"),
         serial,
