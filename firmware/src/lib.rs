@@ -30,7 +30,6 @@ pub mod board;
 mod events;
 pub mod feed;
 mod fmt;
-pub mod friction;
 pub mod hammer;
 pub mod lockstep;
 pub mod logs;
