@@ -18,7 +18,6 @@ use toml::Spanned;
 pub use sensor::{CalibrationFile, GeometryPlan, ImpactPoint, ResponsePoint, SensorPlan, SensorPoint};
 pub use structure::{StructurePlan, turned};
 
-mod answers;
 mod check;
 mod faults;
 pub mod level;
