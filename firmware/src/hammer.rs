@@ -20,10 +20,10 @@ use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US};
 use jointrig_protocol::request::{Fire, Trigger};
 use jointrig_protocol::shot::{Phase, Shot};
 
-use crate::friction::Friction;
 use crate::pulse::Pulse;
 use crate::quiet::Quiet;
 use crate::ruler::{ms_of_scans, scans_in_ms};
+use crate::scales::Friction;
 use crate::scales::{UnitsPerCode, as_built};
 
 /// Shortest time from the end of one pulse to the next, ms. The coil driver's own pause is slightly

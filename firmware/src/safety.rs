@@ -80,8 +80,8 @@ use jointrig_protocol::sync::ClockFault;
 
 use crate::events::Events;
 use crate::fmt::{info, warning};
-use crate::friction::Friction;
 use crate::hammer::{CoilOrder, Hammer, Outcome, Scanned};
+use crate::scales::Friction;
 use crate::scales::UnitsPerCode;
 use crate::shaker::Shaker;
 use crate::supplies::Supplies;

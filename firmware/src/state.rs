@@ -6,12 +6,12 @@
 //! recognised as a repeat is refused.
 
 use crate::fmt::warning;
-use crate::friction::Friction;
 use crate::hammer::{Outcome, Scanned};
 use crate::logs::Tap;
 use crate::ring::{CHANNEL_MAP, Out, Range, Ring, Slot};
 use crate::ruler::InStep;
 use crate::safety::Safety;
+use crate::scales::Friction;
 use crate::scales::{UnitsPerCode, as_built, as_told};
 use crate::sentence::{Sentence, Tell, out_of_bounds};
 use core::cell::RefCell;

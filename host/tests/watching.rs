@@ -11,7 +11,7 @@ use jointrig::campaign::watch::{Seen, Shaking, Standing, Watch};
 use jointrig::device::samples::Samples;
 use jointrig::device::stream::Accounts;
 use jointrig::device::tap::tap;
-use jointrig::live::watcher::{room, watcher};
+use jointrig::live::watching::{room, watcher};
 use peak_alloc::PeakAlloc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -1,13 +1,16 @@
-//! `cargo xtask bench`: a table of run times, compared with those of peers and with the machine's
-//! limit.
+//! Comparisons with other programs. `cargo xtask bench`: a table of run times, compared with those
+//! of peers and with the machine's limit. `cargo xtask parity`: compares results with those of
+//! pyFRF, pyuff and pyFBS.
+//!
+//! Python and its packages are only for these, in a folder under `target/`; jointrig itself does
+//! not need them.
 
-use crate::command;
 use crate::project::Project;
-use crate::python;
 use crate::python::environment;
+use crate::{command, python};
 use anyhow::{Context, Result, bail};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
 /// Text above the tables in docs/performance.md.
@@ -72,4 +75,26 @@ pub fn hot_paths(project: &Project, extra: &[String]) -> Result<()> {
         cargo.arg("--").args(extra);
     }
     command::run(&mut cargo)
+}
+
+/// Prepares Python and runs the comparison.
+pub fn parity(project: &Project) -> Result<()> {
+    let python = parity_python(project)?;
+    let mut cargo = command::cargo(&project.root);
+    cargo.args(["bench", "-p", "jointrig-benches", "--bench", "parity"]);
+    cargo.env("JOINTRIG_PYTHON", python);
+    command::run(&mut cargo)
+}
+
+/// The interpreter of an environment with the packages; created if necessary.
+fn parity_python(project: &Project) -> Result<PathBuf> {
+    let Some(system) = ["python3", "python"].into_iter().find_map(command::find_program) else {
+        bail!(
+            "there is no Python: install python3 with its venv module, or leave the parity check to others"
+        );
+    };
+    let python = environment(&system, &project.target.join("parity-python"), &[])?;
+    println!("pyFBS is installed without its dependencies: of it, only virtual points and SEMM are compared");
+    python::with_peers(&python)?;
+    Ok(python)
 }

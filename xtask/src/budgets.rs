@@ -6,7 +6,7 @@
 
 use crate::packages::Consent;
 use crate::project::{EMULATED_BOARD, Project, WIRED_BOARD};
-use crate::toolchain::Toolchain;
+use crate::setup::Toolchain;
 use crate::{emulator, firmware, setup, size};
 use anyhow::{Context, Result, bail};
 use std::fmt::Write;

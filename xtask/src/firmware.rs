@@ -1,18 +1,19 @@
 //! Compiling for the microcontroller: the two `no_std` libraries, and the board images, each also
 //! as a flat file: the bytes of the flash, for boards that are flashed as a USB drive or by the
-//! loader in ROM.
+//! loader in ROM. And writing the image to the rig's controller.
 //!
 //! Boards are built one at a time, because cargo would unify the features of all that are built
 //! together, and the boards' chip features exclude each other.
 
 use crate::packages::Consent;
-use crate::project::{EMULATED_BOARD, EMULATED_CHECKS, Package, Project, TARGET};
-use crate::toolchain::Toolchain;
+use crate::project::{EMULATED_BOARD, EMULATED_CHECKS, Package, Project, TARGET, WIRED_BOARD};
+use crate::setup::Toolchain;
 use crate::{command, sbom, setup, size};
 use anyhow::{Context, Result, bail};
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, elf};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// The libraries that run on the microcontroller.
 const LIBRARIES: [&str; 2] = ["jointrig-protocol", "jointrig-firmware"];
@@ -169,6 +170,37 @@ fn flat_image(image: &[u8]) -> Result<(u64, Vec<u8>)> {
         flat.extend_from_slice(data);
     }
     Ok((first, flat))
+}
+
+/// The chip of the rig's controller, as probe-rs names it.
+const CHIP: &str = "STM32U5A5ZJTxQ";
+
+/// `cargo xtask flash`: with `detach`, returns once the image is written; otherwise stays attached
+/// and shows the board's log.
+pub fn flash(project: &Project, detach: bool) -> Result<()> {
+    // Everything that is missing is reported together, before anything is built.
+    let mut missing = Vec::new();
+    if board(project, WIRED_BOARD)?.is_none() {
+        missing.push(format!("there is no board image: firmware/boards/{WIRED_BOARD} does not exist yet"));
+    }
+    let probe = command::find_program("probe-rs");
+    if probe.is_none() {
+        missing.push(
+            "probe-rs is not installed: run `cargo install probe-rs-tools --locked` (on Linux it also needs the udev \
+             rules of https://probe.rs/docs/getting-started/probe-setup/)"
+                .to_owned(),
+        );
+    }
+    let (Some(probe), true) = (probe, missing.is_empty()) else {
+        bail!("cannot flash:\n  - {}", missing.join("\n  - "));
+    };
+    let toolchain = setup::target(project, Consent::new(false))?;
+    let image = build_board(project, &toolchain, WIRED_BOARD)?;
+    let mut command = Command::new(probe);
+    command.args([if detach { "download" } else { "run" }, "--chip", CHIP]).arg(image);
+    command::run(&mut command).context(
+        "probe-rs could not write the image: is the board connected by its ST-LINK socket, and powered?",
+    )
 }
 
 #[cfg(test)]

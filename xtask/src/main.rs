@@ -12,11 +12,9 @@ mod budgets;
 mod command;
 mod emulator;
 mod firmware;
-mod flash;
 mod layout;
 mod lint;
 mod packages;
-mod parity;
 mod project;
 mod python;
 mod sbom;
@@ -25,7 +23,6 @@ mod size;
 mod suite;
 mod sysroot;
 mod tests_run;
-mod toolchain;
 
 use clap::{Parser, Subcommand};
 use project::Project;
@@ -138,12 +135,12 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Test(options) => suite::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
-        Task::Flash { detach } => flash::run(&project, detach),
+        Task::Flash { detach } => firmware::flash(&project, detach),
         Task::Python => python::run(&project, python::Jointrig::Build).map(|remark| println!("{remark}")),
         Task::Wheels => python::run_release(&project),
         Task::Book { yes } => book::run(&project, packages::Consent::new(yes)),
         Task::Sbom => sbom::run(&project),
-        Task::Parity => parity::run(&project),
+        Task::Parity => bench::parity(&project),
         Task::Accuracy { tables } => accuracy::run(&project, &tables),
         Task::Bench { hot_paths: true, extra, .. } => bench::hot_paths(&project, &extra),
         Task::Bench { parts, .. } => bench::run(&project, &parts),

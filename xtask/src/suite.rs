@@ -3,8 +3,8 @@
 use crate::firmware;
 use crate::packages::Consent;
 use crate::project::{EMULATED_BOARD, Project};
+use crate::setup::Toolchain;
 use crate::tests_run::{self, Scope};
-use crate::toolchain::Toolchain;
 use crate::{book, budgets, emulator, layout, lint, python, setup};
 use anyhow::{Context, Result, bail};
 use clap::Args;

@@ -20,13 +20,12 @@
 //! | [`reader`] | two chips: alignment with their clock, sixteen channels per scan, faults |
 
 pub mod converter;
-pub mod error;
 pub mod frames;
 pub mod part;
 pub mod reader;
 
+pub use converter::Error;
 pub use converter::{Converter, Settings, registers};
-pub use error::Error;
 pub use part::{Oversampling, Part, Range};
 
 /// Channels of one chip.

@@ -22,8 +22,7 @@
 mod device;
 mod link;
 pub mod mended;
-mod windows;
 
 pub use device::{Buffers, Speed, Usb, build};
+pub use device::{INTERFACE_GUID, VENDOR_CODE};
 pub use link::{Sink, Source};
-pub use windows::{INTERFACE_GUID, VENDOR_CODE};

@@ -1,20 +1,19 @@
-//! The stages of a campaign's analysis, in order.
+//! The analysis of a campaign, from top to bottom: the cells, the FRFs of each configuration, the
+//! joint line by line, the stiffness between the arms, the contact's own stiffness, the specimens.
+//! Each stage gets what it needs from the earlier ones as arguments.
 
 use super::assemble::everything;
 use super::averages::{CellAverage, LINES_HZ};
-use super::cell::Measurements;
-use super::cell::{BANDS, Progress, Wanted};
+use super::cell::{BANDS, Measurements, Progress, Wanted};
 use super::checks::between_the_arms;
 use super::findings::{Findings, Settings};
-use super::from_frfs::Substructured;
-use super::from_frfs::{Fit, NoFit, fits};
-use super::from_frfs::{Recommended, recommended};
+use super::from_frfs::{Fit, NoFit, Substructured, fits, recommended};
 use super::missing::{Missing, given_up};
-use super::{cells_stage, configuration_stage, contact_stage, data_quality};
+use super::{cells_stage, chosen, configuration_stage, contact_answer, contact_stage};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
-use crate::substructuring::averaged::Priors;
+use crate::substructuring::averaged::{Averaged, Priors};
 use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify, keep_common_lines};
@@ -27,76 +26,90 @@ pub fn analyse_measurements<M: Measurements>(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Findings {
     let (names, geometry) = (measurements.cells(), measurements.geometry());
-    let mut cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
-    let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
-    let mut found = Findings {
-        settings: Some(Settings { windowing, lines_hz: LINES_HZ }),
-        missing: std::mem::take(&mut cells.missing),
-        ..Findings::default()
-    };
-    found.missing.extend(given_up(&names, measurements.given_up()));
-    found.data_quality = data_quality::data_quality(geometry, &cells.averages);
 
+    // the cells, read hit by hit: average FRFs, loops of the impacts, responses at the contact
+    let mut cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
+    let mut missing = std::mem::take(&mut cells.missing);
+    missing.extend(given_up(&names, measurements.given_up()));
+    let data_quality = chosen::data_quality(geometry, &cells.averages);
+
+    // the FRF matrix of each configuration
     let place = |structure: Structure| Structure::ALL.iter().position(|s| *s == structure);
     cells.averages.sort_by_key(|average| place(average.name.configuration));
-    let all = Structure::ALL.map(|structure| {
+    let (mut configurations, mut of_all_pairs) = (Vec::new(), Vec::new());
+    let matrices = Structure::ALL.map(|structure| {
         let planned = names.iter().filter(|c| c.configuration == structure).count();
         let own = of_configuration(&cells.averages, structure);
         let points = geometry.points(structure);
-        let (one, whole) = rayon::join(
+        let (one, all_pairs) = rayon::join(
             || configuration_stage::of(measurements, structure, points, own, planned),
             || wanted.frfs.then(|| everything(points, own, measurements.quantity())).flatten(),
         );
-        found.frfs.extend(Some(structure).zip(whole));
-        found.missing.extend(one.missing);
-        found.configurations.push(one.measured);
+        of_all_pairs.extend(Some(structure).zip(all_pairs));
+        missing.extend(one.missing);
+        configurations.push(one.measured);
         one.frf
     });
     forget_frfs(&mut cells.averages);
-    let frfs = all.each_ref().map(Option::as_ref);
-    let own = on_common_lines(frfs, &mut found.missing);
-    let alike = own.as_ref().map_or(frfs, |own| own.each_ref().map(Some));
-    let identified = if let [Some(a), Some(b), Some(ajb)] = alike {
-        substructured([a, b, ajb], geometry)
-    } else {
-        let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
-        Err(Missing::Configurations(absent.map(|(structure, _)| structure).collect()))
-    };
-    match identified {
-        Ok(of_frfs) => {
-            found.missing.extend(of_frfs.cmif.as_ref().err().cloned().map(Missing::Cmif));
-            found.substructured = Some(of_frfs);
+    let frfs = matrices.each_ref().map(Option::as_ref);
+    let common = on_common_lines(frfs, &mut missing);
+    let alike = common.as_ref().map_or(frfs, |common| common.each_ref().map(Some));
+
+    // the joint by substructuring, line by line
+    let substructured = match all_three(alike).and_then(|frfs| substructured(frfs, geometry)) {
+        Ok(found) => {
+            missing.extend(found.cmif.as_ref().err().cloned().map(Missing::Cmif));
+            Some(found)
         }
-        Err(why) => found.missing.push(why),
-    }
-    // a plan without A's interface does not measure the stiffness between the arms
-    let asks = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::InterfaceA);
-    if let Some(ajb) = frfs[2].filter(|_| asks) {
-        let priors = measurements.contact_priors().positions;
-        let Recommended { estimates, bootstrap, missing } =
-            recommended(geometry, ajb, &priors, &cells.hits, wanted.replicates);
-        found.priors = Some(priors);
-        (found.recommended, found.bootstrap) = (estimates, bootstrap);
-        found.missing.extend(missing);
-    }
-    let fit = || {
-        let [Some(a), Some(b), Some(ajb)] = alike else { return Vec::new() };
-        let options =
-            fit::Options { priors: measurements.contact_priors().positions, ..fit::Options::default() };
-        fit_of_the_main_band([a, b, ajb], geometry, &options)
+        Err(why) => {
+            missing.push(why);
+            None
+        }
     };
-    // run in parallel: each uses cores that the other leaves idle
-    let (fits, own) = rayon::join(fit, || super::contact_answer::answer(measurements, &cells.averages));
-    found.fits = fits;
-    let fitted: Vec<_> = found.fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
-    let rows = found.substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
-    let fbs = between_the_arms(&found.recommended, rows);
-    let (contact, missing) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
-    found.missing.extend(missing);
-    found.contact = Some(contact);
-    found.own_stiffness = Some(own.map(|(stiffness, _)| stiffness));
-    found.between_arms = Some(decided(&found));
-    found
+
+    // the stiffness between the arms, from the assembly alone; a plan without A's interface does
+    // not measure it
+    let priors = measurements.contact_priors().positions;
+    let asks = geometry.ajb.channels.iter().any(|p| p.grouping == Grouping::InterfaceA);
+    let assembly = frfs[2].filter(|_| asks);
+    let recommended = assembly
+        .map(|ajb| recommended(geometry, ajb, &priors, &cells.hits, wanted.replicates))
+        .unwrap_or_default();
+    missing.extend(recommended.missing);
+
+    // the fit between the arms, and beside it the contact's own stiffness from the hits: each uses
+    // cores that the other leaves idle
+    let fit = || {
+        let Ok(frfs) = all_three(alike) else { return Vec::new() };
+        fit_of_the_main_band(frfs, geometry, &fit::Options { priors, ..fit::Options::default() })
+    };
+    let (fits, own) = rayon::join(fit, || contact_answer::answer(measurements, &cells.averages));
+    let between_arms = decided(&fits, &recommended.estimates);
+
+    // the specimens: loops, levels, and their stiffness compared with that between the arms
+    let fitted: Vec<_> = fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
+    let rows = substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
+    let fbs = between_the_arms(&recommended.estimates, rows);
+    let (contact, absent) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
+    missing.extend(absent);
+
+    let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
+    Findings {
+        settings: Some(Settings { windowing, lines_hz: LINES_HZ }),
+        data_quality,
+        configurations,
+        frfs: of_all_pairs,
+        substructured,
+        fits,
+        priors: assembly.map(|_| priors),
+        recommended: recommended.estimates,
+        bootstrap: recommended.bootstrap,
+        contact: Some(contact),
+        own_stiffness: Some(own.map(|(stiffness, _)| stiffness)),
+        between_arms: Some(between_arms),
+        missing,
+        ..Findings::default()
+    }
 }
 
 /// Removes the FRFs that are now in the matrices from the averages; otherwise both copies would be
@@ -121,10 +134,19 @@ fn of_configuration(sorted: &[CellAverage], structure: Structure) -> &[CellAvera
         .unwrap_or_default()
 }
 
+/// The FRFs of A, B and AJB; otherwise the configurations that have none.
+fn all_three(frfs: [Option<&Frf>; 3]) -> Result<[&Frf; 3], Missing> {
+    if let [Some(a), Some(b), Some(ajb)] = frfs {
+        return Ok([a, b, ajb]);
+    }
+    let absent = Structure::ALL.into_iter().zip(frfs).filter(|(_, frf)| frf.is_none());
+    Err(Missing::Configurations(absent.map(|(structure, _)| structure).collect()))
+}
+
 /// Copies of all three restricted to their common lines; `None` if one is missing, if their lines
 /// are equal, or if there is no common grid, which [`identify`](fn@identify) then reports.
 fn on_common_lines(frfs: [Option<&Frf>; 3], missing: &mut Vec<Missing>) -> Option<[Frf; 3]> {
-    let [Some(a), Some(b), Some(ajb)] = frfs else { return None };
+    let [a, b, ajb] = all_three(frfs).ok()?;
     if b.frequency_hz() == a.frequency_hz() && ajb.frequency_hz() == a.frequency_hz() {
         return None;
     }
@@ -159,11 +181,11 @@ fn fit_of_the_main_band(frfs: [&Frf; 3], geometry: &Geometry, options: &fit::Opt
 }
 
 /// Decides which estimate of the main band is the stiffness between the arms.
-fn decided(found: &Findings) -> Result<BetweenArms, NoStiffness> {
-    let fitted = found.fits.first().and_then(|fit| match &fit.outcome {
+fn decided(fits: &[Fit], recommended: &[Averaged]) -> Result<BetweenArms, NoStiffness> {
+    let fitted = fits.first().and_then(|fit| match &fit.outcome {
         Ok(fitted) => Some(Ok(fitted)),
         Err(NoFit::Failed(error)) => Some(Err(error)),
         Err(_) => None,
     });
-    between_arms(fitted, found.recommended.iter().find(|r| r.band_hz == MAIN_BAND))
+    between_arms(fitted, recommended.iter().find(|r| r.band_hz == MAIN_BAND))
 }

@@ -4,7 +4,7 @@
 
 use super::averages::CellAverage;
 use super::cell::Measurements;
-use super::cells_stage::Cells;
+use super::cells_stage::{Cells, slip_under_the_hammer};
 use super::checks::contact_change::ContactChange;
 use super::checks::{HiddenResonance, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{ImpactLoop, ImpactLoops};
@@ -73,13 +73,16 @@ pub fn at_the_contact<M: Measurements>(
 ) -> (Contact, Vec<Missing>) {
     let (averages, impact_loops) = (&cells.averages[..], &cells.loops[..]);
     let (geometry, sigma_per_s) = (measurements.geometry(), measurements.sigma_per_s());
+
+    // the loops of the shaker's levels, corrected if the arm is known without them
     let (levels, complaints) = measurements.shaker_levels();
     let mut missing: Vec<Missing> = complaints.into_iter().map(Missing::Level).collect();
     let mut unfit = Vec::new();
-    let arm = known_arm(measurements, averages, &mut unfit);
-    let (steady, no_loop) = shaker_levels::analysed(&levels, arm.as_ref());
+    let known = known_arm(measurements, averages, &mut unfit);
+    let (steady, no_loop) = shaker_levels::analysed(&levels, known.as_ref());
     missing.extend(no_loop);
 
+    // T/Δx of the hits in the frequency domain, and whether a specimen's resonance hides in it
     let by_impact = summed(averages, &mut missing);
     let spectra: Vec<&CrossSpectra> = by_impact.iter().map(|(_, sum)| sum).collect();
     let compliance = ContactCompliance::of_impacts(&spectra);
@@ -91,22 +94,27 @@ pub fn at_the_contact<M: Measurements>(
     let hidden =
         HiddenResonance::of(compliance.as_ref(), &in_groups(averages), &shaker_levels::swept(&levels))
             .with_phases(&frfs);
+    let direct = compliance.and_then(|c| Direct::of(&c.frequency_hz, &c.compliance_m_per_n, sigma_per_s));
 
+    // the static arm: known, or from the levels that stick
     missing.extend(unfit);
     let parallel_path = measurements.known_contact().parallel_path.unwrap_or(0.0);
-    let arm = arm.or_else(|| from_levels(&shaker_levels::stuck(&steady), parallel_path));
+    let arm = known.or_else(|| from_levels(&shaker_levels::stuck(&steady), parallel_path));
     if arm.is_none() && !(steady.is_empty() && impact_loops.is_empty()) {
         missing.push(Missing::EffectiveMass);
     }
-    let slip = super::cells_stage::slip_under_the_hammer(&cells.at_contact);
+
+    // the loops of the impacts
+    let slip = slip_under_the_hammer(&cells.at_contact);
     let slips = slip.found() == Some(true);
     let impacts = impact_loops::gathered(impact_loops, arm.as_ref(), &hidden, slips);
-    let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
-    let at_levels = super::shaker_levels::k_t_of_levels(measurements, averages, own, slips, &loops);
     let shown = example(measurements, averages, impact_loops, hidden.resonance_hz());
     let (example_loop, reconstruction) =
         shown.map_or((None, None), |(drawn, rebuilt)| (Some(drawn), rebuilt));
-    let direct = compliance.and_then(|c| Direct::of(&c.frequency_hz, &c.compliance_m_per_n, sigma_per_s));
+
+    // k_T of the levels, and the stiffness between the arms compared with that at the specimens
+    let loops: Vec<_> = steady.iter().map(|one| (one.level, &one.raw)).collect();
+    let at_levels = shaker_levels::k_t_of_levels(measurements, averages, own, slips, &loops);
     let at_the_specimens = at_the_specimens(direct.as_ref(), impacts.as_ref().map(|i| i.slope_n_per_m));
     let found = Contact {
         frfs,
@@ -121,7 +129,7 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
-        joint: super::shaker_levels::combined_with_hits(own, &at_levels),
+        joint: shaker_levels::combined_with_hits(own, &at_levels),
         levels: shaker_levels::loops(steady, arm.as_ref(), at_levels),
     };
     (found, missing)
@@ -238,7 +246,7 @@ const FIT_HZ: [f64; 2] = [100.0, 600.0];
 /// Cells whose lines differ from those of the first are reported in `missing`. The hits are
 /// transformed to the virtual point by the impacts' transformation, so that a hit away from the
 /// contact is weighted by its lever arm.
-pub fn arm_from_hits(
+fn arm_from_hits(
     averages: &[CellAverage],
     points: &Configuration,
     virtual_point_m: [f64; 3],
@@ -290,7 +298,7 @@ pub fn arm_from_hits(
 
 /// The two specimens' receptances from one impact, their difference, and the load cells' force; hit
 /// and response are positive along +z, so `sign` is −1 for a hit towards −z.
-pub fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfCurve; 4] {
+fn specimen_curves(impact: &str, sign: f64, average: &CrossSpectra) -> [FrfCurve; 4] {
     let of = |output: usize, line: usize| sign * average.h1(line, output);
     let receptance = |output: usize| move |line: usize| of(output, line) / average.s(line);
     [

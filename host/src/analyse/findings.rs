@@ -3,8 +3,8 @@
 //! [`crate::report::document()`] converts them to `results.json`. The stages pass data to later
 //! stages as arguments; none reads what another stored here.
 
+use super::chosen::DataQuality;
 use super::contact_stage::Contact;
-use super::data_quality::DataQuality;
 use super::from_frfs::Fit;
 use super::from_frfs::Substructured;
 use super::missing::Missing;

@@ -1,10 +1,12 @@
 //! Access to a campaign file as measurements: records decoded, in SI units, one cell at a time,
-//! from any thread; the file's provenance, and how much of the plan was measured.
+//! from any thread; the file's provenance, how much of the plan was measured, and the FRFs of one
+//! configuration over any range of lines.
 
-use super::analyse_error::AnalyseError;
+use super::assemble::{everything, hits};
+use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
 use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, Progress, ShakerLevel, Wanted};
-use super::data_quality::DataQuality;
+use super::chosen::DataQuality;
 use super::findings::Findings;
 use super::plan_geometry::{geometry, places};
 use crate::campaign::plan::{Plan, structure};
@@ -25,12 +27,49 @@ use crate::results;
 use crate::results::{Calibrated, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
+use crate::substructuring::Frf;
 use crate::substructuring::geometry::Geometry;
 use jointrig_protocol::channel::{Quantity, Role};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
+
+/// Why a campaign file cannot be analysed, or one of its cells cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum AnalyseError {
+    /// The file cannot be read, or a record is damaged.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A channel that is required for analysing an impact is missing.
+    #[error("record {record}: its session has no channel for {role}")]
+    NoChannel {
+        /// The record.
+        record: i64,
+        /// The missing channel.
+        role: &'static str,
+    },
+    /// One cell has records of two sampling rates.
+    #[error(
+        "record {record} was sampled at {rate_hz} Hz, earlier ones at {others_hz} Hz, so their spectra have different lines: refuse one or the other and measure again"
+    )]
+    Rate {
+        /// The record.
+        record: i64,
+        /// Its rate, Hz.
+        rate_hz: f64,
+        /// Rate of the earlier records, Hz.
+        others_hz: f64,
+    },
+    /// The response channels of the file's sessions measure different quantities, or a quantity
+    /// that is not motion.
+    #[error(
+        "the vibrometer's channels measure {0}: velocity, displacement or acceleration is needed, the same in all sessions"
+    )]
+    Quantity(String),
+}
 
 /// Time kept before the trigger, s: the force window begins 1 ms before the pulse, which is 51
 /// scans at 51.2 kHz.
@@ -690,6 +729,49 @@ pub(super) fn calibrated(store: &Store) -> Result<Vec<Calibrated>, AnalyseError>
         });
     }
     Ok(rows)
+}
+
+impl CampaignFile {
+    /// The FRFs of a configuration's kept hits between two frequencies, Hz, for every pair of the
+    /// geometry, computed as in the analysis, with the number of hits in each (outputs × inputs);
+    /// and messages about cells and records that cannot be used. `None` without a kept hit.
+    pub fn measured(
+        &self,
+        structure: Structure,
+        lines_hz: [f64; 2],
+    ) -> (Option<(Frf, DMatrix<usize>)>, Vec<String>) {
+        let own: Vec<&CellName> =
+            self.cells.iter().map(|cell| &cell.name).filter(|name| name.configuration == structure).collect();
+        let one = |name: &&CellName| {
+            let complaint =
+                |what: String| format!("{structure}: cell {} × {}: {what}.", name.impact, name.response);
+            let mut sums = CellSums::new((*name).clone(), self.sigma_per_s(), Asked::default(), lines_hz);
+            let (mut some, mut unfit) = (false, None);
+            let read = self.each_hit(name, false, &mut |hit, fs_hz| {
+                some = true;
+                if unfit.is_none() {
+                    unfit = sums.add(hit, fs_hz).err();
+                }
+            });
+            let left_out = match read {
+                Ok(left_out) => left_out,
+                Err(error) => return (None, vec![complaint(error.to_string())]),
+            };
+            let mut complaints: Vec<String> = left_out.into_iter().map(complaint).collect();
+            if !some {
+                return (None, complaints);
+            }
+            let found = unfit.map_or_else(|| sums.finish(), Err);
+            complaints.extend(found.as_ref().err().map(|error| complaint(error.to_string())));
+            (found.ok(), complaints)
+        };
+        let (averages, complaints): (Vec<_>, Vec<_>) = own.par_iter().map(one).unzip();
+        let averages: Vec<CellAverage> = averages.into_iter().flatten().collect();
+        let complaints = complaints.concat();
+        let points = self.geometry().points(structure);
+        let found = everything(points, &averages, self.quantity());
+        (found.map(|frf| (frf, hits(points, &averages))), complaints)
+    }
 }
 
 #[cfg(test)]

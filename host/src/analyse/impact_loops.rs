@@ -2,8 +2,8 @@
 
 use super::cell::{ContactDelays, ContactSignals};
 use super::checks::HiddenResonance;
+use crate::hysteresis::analyse::{DECAY_CYCLES, FirstCycle};
 use crate::hysteresis::cycles::open_record;
-use crate::hysteresis::first_cycle::{DECAY_CYCLES, FirstCycle};
 use crate::hysteresis::impact::DecayCycle;
 use crate::hysteresis::phase_split::decaying;
 use crate::hysteresis::static_arm::Identified;

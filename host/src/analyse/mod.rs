@@ -1,16 +1,15 @@
 //! From a campaign to findings: everything is computed from the campaign file alone.
 //!
-//! Processing order: [`analyse`] opens the file ([`Measurements`] is the interface that the stages
-//! use), and `campaign.rs` calls the stages one after another: cells, configurations, results from
-//! the FRFs, the estimates to quote, the fit, the contact. Each returns its results in a separate
-//! type; together they form the [`Findings`].
+//! [`analyse`] opens the file ([`Measurements`] is the interface that the stages use), and
+//! [`analyse_measurements`] in `campaign.rs` is the whole analysis from top to bottom: cells,
+//! configurations, results from the FRFs, the estimates to quote, the fit, the contact. Each stage
+//! returns its results in a separate type; together they form the [`Findings`].
 //!
 //! Cells are read one at a time on each thread and averaged immediately, so that memory holds the
 //! signals of a few cells, never of a whole campaign. Missing data are reported in
 //! [`Findings::missing`], and the analysis continues without them: hysteresis needs only the
 //! assembly, substructuring needs all three configurations.
 
-mod analyse_error;
 mod assemble;
 mod averages;
 mod campaign;
@@ -21,12 +20,10 @@ mod chosen;
 mod configuration_stage;
 mod contact_answer;
 mod contact_stage;
-mod data_quality;
 mod findings;
 mod from_frfs;
 mod from_store;
 mod impact_loops;
-mod measured_frfs;
 mod missing;
 mod plan_geometry;
 mod question;
@@ -36,7 +33,6 @@ mod shaker_levels;
 #[cfg(test)]
 mod shaker_levels_tests;
 
-pub use analyse_error::AnalyseError;
 pub use averages::LINES_HZ;
 pub use campaign::analyse_measurements;
 pub use cell::{BANDS, Progress, Wanted};
@@ -45,6 +41,7 @@ pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use from_frfs::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
+pub use from_store::AnalyseError;
 pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;

@@ -1,8 +1,5 @@
-//! `analyse`: results and report from a campaign file alone.
-//!
-//! `compare`: compares two campaigns.
-//!
-//! `report`: writes every figure and table of a campaign file.
+//! The subcommands that read campaign files and write what they found: `analyse` (results and
+//! report of one file), `compare` (of two), and `report` (every figure and table of one).
 
 use super::error::CliError;
 use super::output;

@@ -72,7 +72,7 @@ enum Command {
     Serve(serve::Serve),
     /// Analyse a campaign for the live page of another process.
     #[cfg(feature = "dashboard")]
-    #[command(name = crate::live::forming::COMMAND, hide = true)]
+    #[command(name = crate::live::numbers::COMMAND, hide = true)]
     AnalyseForPage(AnalyseForPage),
     /// Compare two campaigns.
     Compare(analyse::Compare),

@@ -15,7 +15,7 @@ use crate::dashboard::Dashboard;
 use crate::device::address::Address;
 use crate::device::logs::Tables;
 use crate::device::session::Session;
-use crate::live::forming::analyse_for_another;
+use crate::live::numbers::analyse_for_another;
 use crate::untrusted_text::tell_line;
 use clap::Args;
 use std::path::{Path, PathBuf};

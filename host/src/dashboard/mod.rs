@@ -2,7 +2,7 @@
 //!
 //! No page arms the hammer or moves the shaker. `serve` serves HTTP on the loopback address only,
 //! on one thread, with limits on everything that a client may send; `guard` rejects unauthorised
-//! requests, `routes` answers requests, `edit` passes a page's changes on, `socket` sends updates,
+//! requests, `routes` answers requests and sends updates, `edit` passes a page's changes on,
 //! `page` is the content for the browser, and an error response ([`Problem`]) says what is wrong,
 //! where, and what to do. All of them use the data of [`crate::live`] and run on separate threads,
 //! so that a stalled page affects only its own display.
@@ -10,14 +10,13 @@
 use crate::campaign::run::answers::{Answers, Edits, answers, edits};
 use crate::campaign::store::error::StoreError;
 use crate::device::tap::{Tap, View, tap};
-use crate::live::averaging::Averages;
 use crate::live::bus::Bus;
+use crate::live::figures::Averages;
 use crate::live::follow::Follower;
-use crate::live::forming::{Formed, form};
 use crate::live::frames::Frames;
 use crate::live::message::{Can, Message, Trouble};
-use crate::live::watcher::{WatchQueue, Watcher, watcher};
-use crate::live::watching::Watching;
+use crate::live::numbers::{Formed, form};
+use crate::live::watching::{WatchQueue, Watcher, Watching, watcher};
 use axum::Json;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
@@ -39,7 +38,6 @@ mod edit;
 mod guard;
 mod page;
 mod routes;
-mod socket;
 
 /// Interval of the checks for changes of the file; a check takes a few microseconds.
 const LOOK: Duration = Duration::from_millis(50);

@@ -1,5 +1,5 @@
 use super::{of_average, of_force};
-use crate::live::averaging::Average;
+use crate::live::figures::Average;
 use crate::report::figure::{Figure, Shape};
 use crate::spectra::{CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, estimate};
 use std::f64::consts::PI;

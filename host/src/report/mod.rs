@@ -3,10 +3,8 @@
 //!
 //! The page is a single self-contained HTML text: figures are inline SVG, nothing is fetched, and
 //! it can be printed. Everything shown is contained in [`Results`]; this module computes no
-//! results.
-//!
-//! The document of a campaign file: written by `jointrig analyse`, and shown on a page during the
-//! measurement.
+//! results. The document of a campaign file comes from [`analysed`]: `jointrig analyse` writes it,
+//! and the live page shows it during the measurement.
 
 use crate::analyse::{AnalyseError, Findings, Missing, Progress, Wanted, analyse};
 use crate::campaign::store::Store;
@@ -27,6 +25,7 @@ mod csv;
 mod document;
 pub mod figure;
 mod figures;
+mod html;
 mod page;
 #[cfg(feature = "png")]
 mod png;

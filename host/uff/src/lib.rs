@@ -62,20 +62,19 @@ mod blocks;
 mod foreign_tests;
 mod function;
 mod lines;
+mod nodes;
 mod number;
 #[cfg(test)]
 mod round_trip_tests;
-mod set15;
 mod set151;
 mod set164;
-mod set2411;
 mod set2412;
 mod set58;
 mod set58_values;
 mod set82;
 
 pub use function::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values, kind, quantity};
-pub use set15::Node;
+pub use nodes::Node;
 pub use set82::TraceLine;
 pub use set151::Header;
 pub use set164::Units;
@@ -276,8 +275,8 @@ fn one(
     let body = lines::Lines::of(block.body);
     let set = match block.number {
         58 => set58::read(&block).map(DataSet::from),
-        15 => set15::read(body).map(DataSet::Nodes),
-        2411 => set2411::read(body).map(DataSet::NodesDouble),
+        15 => nodes::read(body).map(DataSet::Nodes),
+        2411 => nodes::read(body).map(DataSet::NodesDouble),
         82 => set82::read(body).map(DataSet::TraceLine),
         2412 => set2412::read(body).map(DataSet::Elements),
         151 => set151::read(body).map(DataSet::Header),
@@ -321,8 +320,8 @@ pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
         let mut out = lines::Output::default();
         let written = match set {
             DataSet::Function(function) => set58::write(function, &mut out),
-            DataSet::Nodes(nodes) => set15::write(nodes, &mut out),
-            DataSet::NodesDouble(nodes) => set2411::write(nodes, &mut out),
+            DataSet::Nodes(nodes) => nodes::write_single(nodes, &mut out),
+            DataSet::NodesDouble(nodes) => nodes::write_double(nodes, &mut out),
             DataSet::TraceLine(line) => set82::write(line, &mut out),
             DataSet::Elements(elements) => set2412::write(elements, &mut out),
             DataSet::Header(header) => set151::write(header, &mut out),

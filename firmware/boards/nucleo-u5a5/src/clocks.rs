@@ -1,4 +1,5 @@
-//! Clocks: all derived from the 16 MHz crystal, so that it determines the scan timing.
+//! Clocks: all derived from the 16 MHz crystal, so that it determines the scan timing; and the
+//! counts of the timers that the converters, the coil and the sync input share.
 
 use embassy_stm32::Config;
 use embassy_stm32::pac;
@@ -6,6 +7,14 @@ use embassy_stm32::rcc::{
     Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
 };
 use embassy_stm32::time::Hertz;
+
+/// Counts of the timers per second.
+pub const TIMER_HZ: u32 = 160_000_000;
+/// CONVST is low for the first µs of each period and then rises: counts of TIM2.
+pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
+/// TIM5 receives TIM2's update through a synchroniser of some cycles (RM0456, "Timer
+/// synchronization"): counts after which TIM5 is up to date.
+pub const SETTLED: u32 = 32;
 
 /// 160 MHz for core, buses and timers: 16 / 2 × 60 / 3. The USB PHY uses the crystal directly,
 /// because its own PLL needs 16 MHz and no clock derived from PLL1 has been found to work.

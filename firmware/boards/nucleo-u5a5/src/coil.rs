@@ -29,7 +29,7 @@ use embassy_stm32::timer::{Ch1, Channel};
 use jointrig_firmware::board::Coil;
 use jointrig_protocol::limits::COIL_PULSE_CAP_US;
 
-use crate::scans::{CONVST_LOW, TIMER_HZ};
+use crate::clocks::{CONVST_LOW, TIMER_HZ};
 
 /// Counts per µs.
 const COUNTS_PER_US: u32 = 8;

@@ -1,16 +1,19 @@
-//! Data that survive a reset: the last panic's message, and the count of starts of the controller.
+//! Data that survive a reset: the last panic's message, and the count of starts of the controller,
+//! which begins at a random number after a power cut.
 //!
 //! Both are in RAM that the start-up code does not initialise. After a power cut they are random,
 //! which a checksum distinguishes from a valid record; after a reset by the watchdog or by software
-//! they are unchanged.
+//! they are unchanged. The random number comes from the RNG with its reset settings; embassy's
+//! driver is not used, because it retries endlessly when the source fails, and a controller must
+//! start without a random number too.
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr::{addr_of, addr_of_mut};
-
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
+use embassy_stm32::pac::{RCC, RNG};
 use heapless::String;
 use jointrig_firmware::sentence::{Sentence, Tell};
 use jointrig_protocol::answer::Reset;
@@ -172,4 +175,32 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     sentence.text("hard fault at ").hex(frame.pc(), 8).text(" from ").hex(frame.lr(), 8).text(": ");
     jointrig_board_fault::status().tell(&mut sentence);
     end(&sentence)
+}
+
+/// Number of polls before the source is considered failed: some ms; the first number takes 0.2 ms.
+const LOOKS: u32 = 100_000;
+
+/// Draws a number; `None` when the source reports an error or does not respond. The RNG is clocked
+/// by HSI48, which `embassy_stm32::init` has started.
+pub fn draw() -> Option<u32> {
+    RCC.ahb2enr1().modify(|w| w.set_rngen(true));
+    // the clock is active two cycles after the write (RM0456, "Peripheral clock enabling"); this
+    // read waits for it
+    let _ = RCC.ahb2enr1().read();
+    RNG.cr().modify(|w| w.set_rngen(true));
+    let mut drawn = None;
+    for _ in 0..LOOKS {
+        let status = RNG.sr().read();
+        if status.seis() || status.ceis() {
+            break;
+        }
+        if status.drdy() {
+            // zero indicates an error that occurred between the two reads (RM0456, "RNG operation")
+            drawn = Some(RNG.dr().read()).filter(|number| *number != 0);
+            break;
+        }
+    }
+    RNG.cr().modify(|w| w.set_rngen(false));
+    RCC.ahb2enr1().modify(|w| w.set_rngen(false));
+    drawn
 }

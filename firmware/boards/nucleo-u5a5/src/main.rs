@@ -24,7 +24,6 @@
 #![no_std]
 #![no_main]
 
-mod adc;
 mod channels;
 mod chips;
 mod clocks;
@@ -32,10 +31,8 @@ mod coil;
 mod dma;
 mod drive;
 mod guard;
-mod inputs;
 mod keep;
 mod lights;
-mod nonce;
 mod probe;
 mod restart;
 mod rings;
@@ -76,7 +73,7 @@ impl Board for Nucleo {
     type Scans = scans::Converters;
     type Coil = coil::PulseTimer;
     type Drive = drive::ShakerDrive;
-    type Inputs = inputs::Switches;
+    type Inputs = guard::Switches;
     type Source = usb::Source;
     type Sink = usb::Sink;
     type Stage = NoStage;
@@ -110,7 +107,7 @@ async fn acquisition(
     mut scans: scans::Converters,
     mut coil: coil::PulseTimer,
     mut drive: drive::ShakerDrive,
-    mut inputs: inputs::Switches,
+    mut inputs: guard::Switches,
 ) {
     acquire::acquire(core, &mut scans, &mut coil, &mut drive, &mut inputs).await;
 }
@@ -134,14 +131,14 @@ async fn main(spawner: Spawner) {
     let dog = watchdog::start(p.IWDG);
     let mut without_nonce = false;
     let start = keep::count_start(|| {
-        nonce::draw().unwrap_or_else(|| {
+        keep::draw().unwrap_or_else(|| {
             without_nonce = true;
             1
         })
     });
 
     let coil = coil::PulseTimer::new(p.TIM1, p.PE9, p.PE15);
-    let inputs = inputs::Switches::new(p.PF13, p.PF14, p.PF15, p.PF12);
+    let inputs = guard::Switches::new(p.PF13, p.PF14, p.PF15, p.PF12);
     let facts = Facts {
         board: channels::name("nucleo-u5a5"),
         serial,

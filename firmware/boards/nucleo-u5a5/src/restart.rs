@@ -16,8 +16,8 @@ use embassy_stm32::pac::spi::Spi;
 use embassy_stm32::pac::spi::regs::Cr1;
 use embassy_stm32::pac::{GPDMA1, TIM2};
 
+use crate::clocks::CONVST_LOW;
 use crate::dma::{self, Carries};
-use crate::scans::CONVST_LOW;
 
 /// The DMA channel of each port.
 const CHANNELS: [usize; 2] = [4, 5];

@@ -27,18 +27,12 @@ use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, MAX_CHANNELS};
 use jointrig_protocol::sync::{self as protocol, ClockFault};
 
 use crate::chips::{self, Chips, SETTINGS};
+use crate::clocks::{CONVST_LOW, SETTLED, TIMER_HZ};
 use crate::lights::{FAULT, SCANNING};
 use crate::rings::{self, BLOCKS, FIRST, SECOND};
 use crate::{BLOCK_SCANS, SCAN_RATE_HZ, Shared, restart, sync, watchdog};
 use core::sync::atomic::Ordering;
 
-/// Counts of the timers per second.
-pub const TIMER_HZ: u32 = 160_000_000;
-/// CONVST is low for the first µs of each period and then rises: counts of TIM2.
-pub const CONVST_LOW: u32 = TIMER_HZ / 1_000_000;
-/// TIM5 receives TIM2's update through a synchroniser of some cycles (RM0456, "Timer
-/// synchronization"): counts after which TIM5 is up to date.
-pub const SETTLED: u32 = 32;
 /// A block takes 0.29 ms; without one for this long, the converters count as silent.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// Time between two attempts to set up silent converters.

@@ -1,21 +1,23 @@
 //! Values measured ten times a second by the chip's ADC1: the bias of the two constant-current
 //! supplies, the specimen's temperature, and the presence of the USB's 5 V.
 //!
-//! Circuits and pins: docs/WIRING.md. A conversion takes a few µs; only this task waits for it, in
-//! thread mode.
+//! Circuits and pins: docs/WIRING.md. A conversion takes a few µs and is started by software; only
+//! this task waits for it, in thread mode. The converter's registers are accessed directly (RM0456,
+//! "Analog-to-digital converter (ADC1 and ADC2)"), in the same order as embassy-stm32's driver,
+//! which would take 2 kB of flash here.
 
+use crate::channels;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
-
 use critical_section::Mutex;
-use embassy_stm32::Peri;
-use embassy_stm32::peripherals::{ADC1, PC0, PC1, PC2, PC3};
+use embassy_stm32::pac::adc::vals::{Pcsel, SampleTime};
+use embassy_stm32::pac::adccommon::vals::Presc;
+use embassy_stm32::pac::{ADC1, ADC12_COMMON, RCC};
+use embassy_stm32::peripherals::{PC0, PC1, PC2, PC3};
+use embassy_stm32::{Peri, peripherals};
 use embassy_time::Timer;
 use jointrig_firmware::supplies::pt1000_c;
 use jointrig_protocol::slow::{Slow, Supply};
-
-use crate::adc::Adc;
-use crate::channels;
 
 /// Steps of the converter: 14 bits (RM0456, "ADC main features").
 const STEPS: f32 = 16_384.0;
@@ -63,7 +65,7 @@ pub fn has_vbus() -> bool {
 
 /// Runs forever.
 #[embassy_executor::task]
-pub async fn task(adc: Peri<'static, ADC1>, pins: Pins) {
+pub async fn task(adc: Peri<'static, peripherals::ADC1>, pins: Pins) {
     let mut adc = Adc::new(adc, pins, &[THERMOMETER, FORCE, VBUS_SENSE, EXCITATION]).await;
     loop {
         // fraction of the reference
@@ -79,5 +81,53 @@ pub async fn task(adc: Peri<'static, ADC1>, pins: Pins) {
         critical_section::with(|section| *LATEST.borrow_ref_mut(section) = Some(slow));
         MEASURED.store(true, Ordering::Release);
         Timer::after_millis(EVERY_MS).await;
+    }
+}
+
+/// Start-up time of the regulator, µs: 10 in embassy-stm32; the data sheet's value was not checked,
+/// and this is not time-critical.
+const REGULATOR_US: u64 = 100;
+
+/// The initialised converter and its pins.
+struct Adc<P> {
+    _adc: Peri<'static, peripherals::ADC1>,
+    _pins: P,
+}
+
+impl<P> Adc<P> {
+    /// Starts and calibrates the converter for these inputs (numbers of ADC1_IN…, whose pins are
+    /// analog after a reset).
+    async fn new(adc: Peri<'static, peripherals::ADC1>, pins: P, inputs: &[u8]) -> Self {
+        critical_section::with(|_| RCC.ahb2enr1().modify(|w| w.set_adc12en(true)));
+        // from the bus's 160 MHz; at most 55 MHz are allowed
+        ADC12_COMMON.ccr().modify(|w| w.set_presc(Presc::DIV4));
+        ADC1.cr().modify(|w| {
+            w.set_deeppwd(false);
+            w.set_advregen(true);
+        });
+        Timer::after_micros(REGULATOR_US).await;
+        ADC1.cr().modify(|w| w.set_adcallin(true));
+        ADC1.cr().modify(|w| w.set_adcal(true));
+        while ADC1.cr().read().adcal() {}
+        Timer::after_micros(1).await;
+        ADC1.isr().write(|w| w.set_adrdy(true));
+        ADC1.cr().modify(|w| w.set_aden(true));
+        while !ADC1.isr().read().adrdy() {}
+        for input in inputs {
+            ADC1.pcsel().modify(|w| w.set_pcsel(usize::from(*input), Pcsel::PRESELECTED));
+            // 2 µs to charge the converter's capacitor from the 100 nF at the pin
+            ADC1.smpr(0).modify(|w| w.set_smp(usize::from(*input), SampleTime::CYCLES79_5));
+        }
+        Self { _adc: adc, _pins: pins }
+    }
+
+    /// One conversion of 14 bits, about 3 µs.
+    #[expect(clippy::unused_self, reason = "only the owner of the converter may start it")]
+    fn read(&mut self, input: u8) -> u16 {
+        ADC1.sqr1().write(|w| w.set_sq(0, input));
+        ADC1.cr().modify(|w| w.set_adstart(true));
+        // reading the data register clears the flag
+        while !ADC1.isr().read().eoc() {}
+        ADC1.dr().read().rdata() as u16
     }
 }

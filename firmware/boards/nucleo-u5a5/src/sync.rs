@@ -22,7 +22,7 @@ use jointrig_firmware::ruler::{Ago, Ruler, Span};
 use jointrig_protocol::sync::{Clock, ClockFault};
 
 use crate::SCAN_RATE_HZ;
-use crate::scans::{CONVST_LOW, SETTLED, TIMER_HZ};
+use crate::clocks::{CONVST_LOW, SETTLED, TIMER_HZ};
 
 /// Counts per scan.
 pub const PERIOD: u32 = TIMER_HZ / SCAN_RATE_HZ;

@@ -13,7 +13,6 @@ pub(crate) use check::normal_load;
 pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
 
 mod check;
-mod document;
 mod own_structure;
 
 /// The built-in default rig, as text.
@@ -75,7 +74,7 @@ impl RigConfig {
     /// [`RigError::Document`] for text that is not TOML, an unknown field or a wrong type, with its
     /// line; [`RigError::Field`] for an invalid value.
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
-        document::read(text)
+        check::read(text)
     }
 
     /// The complete rig as TOML; [`RigConfig::from_toml`] reads it back equal.
@@ -89,7 +88,7 @@ impl RigConfig {
         }
         let mut table = toml::Table::try_from(self).expect(written);
         // these fields describe another rig
-        table.retain(|field, _| !document::PAPERS_OWN.contains(&field));
+        table.retain(|field, _| !check::PAPERS_OWN.contains(&field));
         table.to_string()
     }
 
@@ -124,7 +123,7 @@ impl RigConfig {
 
 impl Default for RigConfig {
     fn default() -> Self {
-        document::read(DEFAULT_TOML).expect("rigs/default.toml is a complete, valid rig: a test reads it")
+        check::read(DEFAULT_TOML).expect("rigs/default.toml is a complete, valid rig: a test reads it")
     }
 }
 

@@ -11,8 +11,8 @@
 //! result must depend on the contact as measured, not on the contact that the hits found.
 
 use super::block::{Block, Group};
-use super::line::{Eliminated, eliminated};
 use super::model::{A, LineModel, Sparse, T};
+use super::model::{Eliminated, eliminated};
 use super::parameters::{COMPLIANCE, DELAYS, GAINS, RETARDATION};
 use crate::C;
 use nalgebra::{DMatrix, DVector};

@@ -12,7 +12,7 @@
 //! 2. **Rotation.** Points on specimen A show its motion as a rigid body; arm B's points show that
 //!    of B.
 //! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells
-//!    together. The motion of the bodies is eliminated at every line (`line`), so that noise in the
+//!    together. The motion of the bodies is eliminated at every line (`model`), so that noise in the
 //!    signals that the force is formed from does not pull k_T down. Spots, points, gains, delays,
 //!    the hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local
 //!    resonances of the specimen calibrate them.
@@ -21,24 +21,21 @@
 //!
 //! - `block`: the measured signals of each cell, and the cells of an impact
 //! - `parameters`: the unknowns
-//! - `model`: the signals as a linear map of the motion; `line`: its elimination
+//! - `model`: the signals of a line as a linear map of the motion, and its elimination
 //! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell
 //!   beyond its noise
-//! - `diagnosis`: tests of the assumptions, and the band in which the bodies are rigid
-//! - `outcome`: the result and the sources of its uncertainty
-//! - `levels`: k_T of the shaker's levels, given the result of the hits; `driven`: the rotation of
-//!   the bodies there; `joint`: the average of both
+//! - `outcome`: the result and the sources of its uncertainty, tests of the assumptions, and the
+//!   band in which the bodies are rigid
+//! - `driven`: the rotation of the bodies while the shaker runs
+//! - `levels`: k_T of the shaker's levels, given the result of the hits; the average of both
 
 use std::f64::consts::TAU;
 
 mod block;
-mod diagnosis;
 mod driven;
-mod joint;
 mod levels;
 #[cfg(test)]
 mod levels_tests;
-mod line;
 mod model;
 mod outcome;
 mod parameters;
@@ -47,19 +44,17 @@ mod solver;
 mod tests;
 
 pub use block::{ContactCell, SIGMA_PER_S};
-pub use diagnosis::{Diagnosis, Doubt, Farthest, SignalResidual};
-pub use joint::{Joint, joint};
-pub use levels::{LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, level_stiffness};
-pub use outcome::Interval;
-pub use outcome::{OfFrequency, Stiffness};
+pub use levels::{
+    Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
+};
+pub use outcome::{Diagnosis, Doubt, Farthest, Interval, OfFrequency, SignalResidual, Stiffness};
 pub use parameters::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
 use block::{Block, Group, blocks};
-use diagnosis::trusted;
 use nalgebra::DVector;
-use outcome::{Variances, of_sum};
+use outcome::{Variances, of_sum, trusted};
 use parameters::{FORM, Parameters};
 use solver::Certainty;
 use solver::Solution;

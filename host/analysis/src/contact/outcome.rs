@@ -1,18 +1,23 @@
 //! The result: k_T and c_T with their confidence intervals, the sources of uncertainty of a
-//! compliance, and k_T(f).
+//! compliance, and k_T(f); with tests of the estimate's assumptions on its residuals, and the band
+//! in which the model holds: beyond it an arm or a specimen bends, or the load cells' calibration
+//! ends.
+//!
+//! The bodies are rigid up to their first bending mode, whose frequency is unknown before the
+//! measurement. The residuals of a fit over the whole band show it: if they contradict the model at
+//! one end of the band, the lines there carry no information on the contact and are left out. Only
+//! the ends are removed. A contradiction in the middle means that a point is misplaced or loose,
+//! and stays a doubt.
 
 use super::block::Block;
-use super::diagnosis::{Diagnosis, Doubt, diagnose, part};
-use super::parameters::Cause;
-use super::parameters::{COMPLIANCE, Parameters, RETARDATION};
-use super::solver::BIN_HZ;
-use super::solver::Certainty;
-use super::solver::Solution;
+use super::parameters::{COMPLIANCE, Cause, Parameters, RETARDATION};
+use super::solver::{BIN_HZ, Bin, Certainty, Solution};
 use super::{ContactError, Input};
 use crate::band::Band;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
+use crate::substructuring::geometry::Grouping;
 use crate::substructuring::joint_over_bands::NORMAL_95;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -165,4 +170,252 @@ pub fn stiffness_of(
     let ci95 = [1.0 / (compliance + half), 1.0 / (compliance - half)];
     let shares = variances.into_iter().map(|(cause, variance)| (cause, variance.sqrt() / compliance));
     Ok((Interval { mean: 1.0 / compliance, ci95 }, shares.filter(|(_, share)| *share > 0.0).collect()))
+}
+
+/// χ² per degree of freedom above which a kind of signal contradicts the model, allowing for the
+/// uncertainty of the noise itself.
+const CONTRADICTED: f64 = 10.0;
+/// Standard deviations by which one of about a hundred stated quantities may be off.
+const BEYOND: f64 = 5.0;
+/// Standard deviations by which two readings of k_T may differ.
+const APART: f64 = 4.0;
+
+/// The residual of some signals.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SignalResidual {
+    /// χ² per degree of freedom: 1 where only noise is left.
+    pub chi_square: f64,
+    /// Rms of the residual relative to the signals' rms, both weighted by the noise.
+    pub part: f64,
+}
+
+/// Signals that are judged together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signals {
+    /// All signals of the hits on B alone: they test the force's form.
+    Calibration,
+    /// The points on specimen A.
+    SpecimenA,
+    /// The spots in the assembly.
+    Spots,
+}
+
+impl Signals {
+    /// All kinds of signals.
+    pub const ALL: [Self; 3] = [Self::Calibration, Self::SpecimenA, Self::Spots];
+
+    /// Indices of their kinds of rows.
+    fn kinds(self) -> &'static [usize] {
+        match self {
+            Self::Calibration => &[0, 1, 3, 5],
+            Self::SpecimenA => &[4],
+            Self::Spots => &[1, 2],
+        }
+    }
+
+    /// The assumption that they contradict.
+    fn doubt(self) -> Doubt {
+        match self {
+            Self::Calibration => Doubt::Force,
+            Self::SpecimenA => Doubt::SpecimenA,
+            Self::Spots => Doubt::Spots,
+        }
+    }
+
+    /// Fraction of the signal that may remain unexplained in addition to noise. Aim errors leave
+    /// about a per cent of a strong local mode, which the misfit in the interval covers; a
+    /// misplaced or loose point leaves more.
+    fn unexplained(self) -> f64 {
+        match self {
+            Self::Calibration => 0.01,
+            Self::SpecimenA => 0.04,
+            Self::Spots => 0.02,
+        }
+    }
+
+    /// The model's residual of these signals in some bins.
+    pub fn left<'a>(self, blocks: &[Block], bins: impl Iterator<Item = &'a Bin>) -> SignalResidual {
+        let alone = self == Self::Calibration;
+        // if the effect of the hammer's aim is only partly known, its errors are not the points'
+        // fault: such impacts are left out
+        let judged =
+            |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
+        let own = bins.filter(|bin| {
+            let block = &blocks[bin.block];
+            block.along_z.is_some() == alone && (alone || judged(block))
+        });
+        let kinds = own.flat_map(|bin| self.kinds().iter().map(move |k| bin.normal.kinds[*k]));
+        let [chi, expected, signal] =
+            kinds.fold([0.0; 3], |sum: [f64; 3], of| std::array::from_fn(|i| sum[i] + of[i]));
+        SignalResidual {
+            chi_square: if expected > 1e-9 { chi / expected } else { 0.0 },
+            part: if signal > 0.0 { (chi / signal).sqrt() } else { 0.0 },
+        }
+    }
+
+    /// Whether this residual contradicts the model.
+    pub fn contradict(self, left: SignalResidual) -> bool {
+        left.chi_square > CONTRADICTED && left.part > self.unexplained()
+    }
+}
+
+/// The quantity that deviates most from its stated value.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Farthest {
+    /// Name of the position, angle, gain or delay.
+    pub what: String,
+    /// Its deviation, in stated standard deviations.
+    pub deviations: f64,
+}
+
+/// How well each assumption holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Residual of the force's form in the hits on B alone.
+    pub calibration: SignalResidual,
+    /// Residual of specimen A's points as points of a rigid body.
+    pub specimen_a: SignalResidual,
+    /// Residual of the spots.
+    pub spots: SignalResidual,
+    /// χ² per degree of freedom of k_T(f) being a single number.
+    pub flatness_chi_square: f64,
+    /// The position, angle, gain or delay that deviates most from its stated value; none if nothing
+    /// is stated.
+    pub farthest: Option<Farthest>,
+    /// Difference between the compliance from hits on A and from hits on the moving mass, in
+    /// standard deviations; none if only one was hit.
+    pub sides_apart: Option<f64>,
+}
+
+/// An assumption that does not hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Doubt {
+    /// The form does not reproduce the force in the hits on B alone.
+    Force,
+    /// Specimen A does not move as a rigid body, or a point is misplaced.
+    SpecimenA,
+    /// A spot does not move with its body.
+    Spots,
+    /// A position, angle, gain or delay deviates from its stated value by more than its stated
+    /// error allows.
+    Stated,
+    /// k_T changes with frequency.
+    Flatness,
+    /// k_T depends on where the structure is hit.
+    Sides,
+}
+
+/// The compliance from a subset of the lines, with all other parameters from all lines: its
+/// difference from the overall estimate, and its standard deviation.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    /// Deviation, m/N.
+    pub deviation: f64,
+    /// Standard deviation, m/N.
+    pub sigma: f64,
+}
+
+/// The compliance of the lines that `of` selects by block and bin, as an additional parameter next
+/// to all others (score test).
+pub fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> bool) -> Option<Part> {
+    let mut own = 0.0;
+    let mut slope = 0.0;
+    let mut coupling = DVector::zeros(solution.p.len());
+    for bin in &solution.bins {
+        let block = &blocks[bin.block];
+        if block.along_z.is_some() || !of(block, bin.low_hz) {
+            continue;
+        }
+        let weight = solution.shared.recip();
+        let row = block.local(COMPLIANCE);
+        own += weight * bin.normal.information[(row, row)];
+        slope += weight * bin.normal.gradient[row];
+        for (i, parameter) in block.parameters.iter().enumerate() {
+            coupling[*parameter] += weight * bin.normal.information[(row, i)];
+        }
+    }
+    // half of the inverse
+    let explained = 2.0 * quadratic(&solution.certainty.answer, &coupling);
+    let left = own - explained;
+    (left > 1e-6 * own && own > 0.0).then(|| Part { deviation: -slope / left, sigma: (0.5 / left).sqrt() })
+}
+
+fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
+    (matrix * v).dot(v)
+}
+
+/// Tests every assumption. Aims are not candidates for the largest deviation: on the moving mass
+/// they absorb the effect of shifts of the hammer.
+pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
+    let stated = parameters
+        .all()
+        .iter()
+        .zip(&solution.p)
+        .filter(|(own, _)| !matches!(own.cause, Cause::Noise | Cause::Aim) && own.sigma > 0.0);
+    let farthest = stated
+        .map(|(own, p)| (own, own.deviations(*p)))
+        .max_by(|(_, a), (_, b)| a.total_cmp(b))
+        .map(|(own, deviations)| Farthest { what: own.name.clone(), deviations });
+    let mut lows: Vec<f64> = solution.bins.iter().map(|bin| bin.low_hz).collect();
+    lows.sort_by(f64::total_cmp);
+    lows.dedup();
+    let parts: Vec<Part> = lows.iter().filter_map(|low| part(blocks, solution, |_, at| at == *low)).collect();
+    let flatness: f64 = parts.iter().map(|p| (p.deviation / p.sigma).powi(2)).sum();
+    let on_mass = |block: &Block| block.grouping == Grouping::InternalA;
+    let hit = |wanted: bool| blocks.iter().any(|b| b.along_z.is_none() && on_mass(b) == wanted);
+    let sides =
+        (hit(true) && hit(false)).then(|| part(blocks, solution, |block, _| on_mass(block))).flatten();
+    Diagnosis {
+        calibration: Signals::Calibration.left(blocks, solution.bins.iter()),
+        specimen_a: Signals::SpecimenA.left(blocks, solution.bins.iter()),
+        spots: Signals::Spots.left(blocks, solution.bins.iter()),
+        farthest,
+        flatness_chi_square: if parts.is_empty() { 1.0 } else { flatness / parts.len() as f64 },
+        sides_apart: sides.map(|part| part.deviation / part.sigma),
+    }
+}
+
+impl Diagnosis {
+    /// The assumptions that do not hold.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        let left = [self.calibration, self.specimen_a, self.spots];
+        let contradicting =
+            Signals::ALL.into_iter().zip(left).filter(|(signals, left)| signals.contradict(*left));
+        let mut all: Vec<Doubt> = contradicting.map(|(signals, _)| signals.doubt()).collect();
+        if self.farthest.as_ref().is_some_and(|one| one.deviations > BEYOND) {
+            all.push(Doubt::Stated);
+        }
+        if self.flatness_chi_square > CONTRADICTED {
+            all.push(Doubt::Flatness);
+        }
+        if self.sides_apart.is_some_and(|apart| apart.abs() > APART) {
+            all.push(Doubt::Sides);
+        }
+        all
+    }
+}
+
+/// A narrower band hardly determines a stiffness and a damping, Hz. A contradiction at all
+/// frequencies is not a matter of the band.
+const NARROWEST_HZ: f64 = 200.0;
+
+/// The band without the ends at which the residuals contradict the model; the whole band if too
+/// little would remain or nothing contradicts.
+pub fn trusted(blocks: &[Block], bins: &[Bin], whole: Band) -> Band {
+    let mut lows: Vec<f64> = bins.iter().map(|bin| bin.low_hz).collect();
+    lows.sort_by(f64::total_cmp);
+    lows.dedup();
+    let holds = |low: &f64| {
+        let own = || bins.iter().filter(|bin| bin.low_hz == *low);
+        Signals::ALL.iter().all(|signals| !signals.contradict(signals.left(blocks, own())))
+    };
+    let good: Vec<bool> = lows.iter().map(holds).collect();
+    let (Some(first), Some(last)) = (good.iter().position(|g| *g), good.iter().rposition(|g| *g)) else {
+        return whole;
+    };
+    let low_hz = if first == 0 { whole.low_hz } else { lows[first] };
+    // a line on the edge belongs to the next bin
+    let high_hz = if last + 1 == lows.len() { whole.high_hz } else { (lows[last] + BIN_HZ).next_down() };
+    if high_hz - low_hz < NARROWEST_HZ { whole } else { Band { low_hz, high_hz } }
 }

@@ -9,7 +9,7 @@
 
 use super::ContactError;
 use super::block::Block;
-use super::line::{Normal, Residual};
+use super::model::{Normal, Residual};
 use super::parameters::{COMPLIANCE, Parameters};
 use crate::errors_in_variables::NoiseInflation;
 use crate::frf::noise::shared_by_lines;

@@ -6,11 +6,11 @@
 //! whatever is needed of all cycles is summed in the same pass.
 
 use super::HysteresisError;
+use super::frequency::Timing;
 use super::loops::Cycle;
 use super::loops::{energy, swing};
 use super::record::{HysteresisRecord, RelativeMotion};
 use super::static_arm::Correction;
-use super::timing::Timing;
 use crate::parallel::prelude::*;
 use crate::vectors::wide;
 use crate::vectors::{dot, mean};

@@ -7,14 +7,12 @@
 //! friction, so all three change with the force. A hammer's own scatter of two per cent is enough
 //! to see that, because the hits of one cell share everything else: place, aim and direction.
 //!
-//! So d ln(response per newton) / d ln(force) is estimated from the differences of hits within each
-//! cell, separately for each band and signal, and compared with the remaining scatter as a ratio of
-//! variances, whose mean is one while nothing slips. No model of the structure, no stiffness and no
-//! noise level is assumed. A plan that makes every second hit softer (`force.softer`) resolves it
-//! ten times more finely than a hammer's own scatter.
-//!
-//! The response to one hit per newton, line by line: the basis for comparing hits of different
-//! force.
+//! So the response to each hit per newton is computed line by line ([`HitResponse`]), and
+//! d ln(response per newton) / d ln(force) is estimated from the differences of hits within each
+//! cell, separately for each band and signal. [`HammerSlip`] compares it with the remaining scatter
+//! as a ratio of variances, whose mean is one while nothing slips. No model of the structure, no
+//! stiffness and no noise level is assumed. A plan that makes every second hit softer
+//! (`force.softer`) resolves it ten times more finely than a hammer's own scatter.
 
 use crate::spectra::fft::forward;
 use num_complex::Complex;

@@ -7,7 +7,7 @@
 
 use super::HysteresisError;
 use super::cycles::open_record;
-use super::dominant_frequency::{dominant_frequency, turns};
+use super::frequency::{dominant_frequency, turns};
 use super::loops::{slope, swing};
 use super::record::Relative;
 use crate::median::middle;

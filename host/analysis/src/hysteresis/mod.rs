@@ -5,7 +5,8 @@
 //! frequency, with velocity integrated to displacement over whole cycles) or [`impact`] (a decay,
 //! cut by its dominant mode) → [`loops`] (slopes, area, secant, fundamental) with `stick` (the
 //! stick part and the plateau) and [`shape`]; `steady` combines them for a shaker record.
-//! [`analyse`](mod@analyse) is the entry point, [`loop_analysis`] its result.
+//! [`analyse`](mod@analyse) is the entry point. Its result is [`LoopAnalysis`], with the findings
+//! that a reader must know before using its numbers, each with its magnitude.
 //!
 //! Definitions are stated only here: k_T is the least-squares slope of the stick part; k_eq that of
 //! the whole loop; the peak secant and the ratio of fundamentals have their own names. T is used as
@@ -14,16 +15,17 @@
 //! the corrected record is analysed in addition to the raw one. [`compliance`] treats the same
 //! signals in the frequency domain, [`backbone`] several levels.
 
+use impact::DecayCycle;
+use num_complex::Complex;
+use serde::Serialize;
+
 pub mod analyse;
 pub mod backbone;
 pub mod compliance;
 pub mod cycles;
-mod dominant_frequency;
-pub mod first_cycle;
+mod frequency;
 pub mod hammer_slip;
-mod hum;
 pub mod impact;
-pub mod loop_analysis;
 pub mod loops;
 pub mod phase_split;
 pub mod record;
@@ -32,11 +34,8 @@ pub mod shape;
 pub mod static_arm;
 mod steady;
 mod stick;
-mod timing;
 
 pub use analyse::{analyse, analyse_both, analyse_corrected};
-pub use loop_analysis::LoopFinding;
-pub use loop_analysis::{Kind, LoopAnalysis};
 pub use loops::OverCycles;
 pub use record::{HysteresisRecord, RelativeMotion};
 pub use shape::{Shape, ShapeEvidence};
@@ -114,11 +113,180 @@ pub enum HysteresisError {
     #[error("force or relative motion is constant: there is no loop; check the channels")]
     NoMotion,
 }
+
+/// How the contact was moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Steadily, at one frequency.
+    Shaker,
+    /// By one hit, decaying.
+    Impact,
+}
+
+/// Full result for a record's loops. The loop of a shaker record is periodic; those of an impact
+/// are its first cycles.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopAnalysis {
+    /// How the contact was moved.
+    pub kind: Kind,
+    /// Excitation frequency, or the dominant mode of the decay, Hz.
+    pub frequency_hz: f64,
+    /// Half the swing of Δx (averaged loop; first cycle of a decay), m.
+    pub amplitude_m: f64,
+    /// Half the swing of T in the same loop, N.
+    pub force_amplitude_n: f64,
+    /// The loop's shape.
+    pub shape: Shape,
+    /// Evidence for the shape; `None` for a decay, where the shape follows from the drop in
+    /// frequency at large amplitude.
+    pub shape_evidence: Option<ShapeEvidence>,
+    /// k_T: slope of the stick part, N/m. `None` for an ellipse.
+    pub k_t_n_per_m: Option<OverCycles>,
+    /// The fraction of the force's swing after each reversal over which k_T was fitted; only if
+    /// something slips.
+    pub stick_part: Option<[f64; 2]>,
+    /// k_eq: least-squares slope over the whole loop, N/m.
+    pub k_eq_n_per_m: OverCycles,
+    /// Loop area per cycle, J. `None` for a decay, whose loops do not close.
+    pub energy_j: Option<OverCycles>,
+    /// Peak secant of the averaged loop, N/m.
+    pub k_secant_n_per_m: Option<f64>,
+    /// T₁/Δx₁ of the averaged loop, N/m (complex: real part, imaginary part).
+    pub k_fundamental_n_per_m: Option<Complex<f64>>,
+    /// μN from the plateau's median, N; only in gross slip.
+    pub friction_limit_n: Option<f64>,
+    /// μ; only if the normal load is known.
+    pub friction_coefficient: Option<f64>,
+    /// Phase by which Δx lags T at the fundamental, degrees.
+    pub phase_deg: f64,
+    /// Δx of the loop for plotting, m: the averaged cycle, or the first cycles of a decay.
+    pub loop_displacement_m: Vec<f64>,
+    /// T of the same points, N.
+    pub loop_force_n: Vec<f64>,
+    /// Every cycle of a decay; empty for a shaker.
+    pub decay_cycles: Vec<DecayCycle>,
+    /// Faults of the loop and corrections made, each with its magnitude.
+    pub findings: Vec<LoopFinding>,
+    /// Warnings for the reader.
+    pub warnings: Vec<String>,
+}
+
+/// A fault of a loop, or a correction that was made.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "finding")]
+#[non_exhaustive]
+pub enum LoopFinding {
+    /// The force falls while the contact is pushed, and the loop dissipates no energy: the sign of
+    /// the force is wrong, or A and B are swapped. No k_T is reported.
+    ReversedForce {
+        /// Least-squares slope over the whole loop, N/m.
+        k_eq_n_per_m: f64,
+        /// Loop area per cycle, J.
+        energy_j: f64,
+    },
+    /// The force lags the motion (leads it, if negative).
+    LateForce {
+        /// Delay, s.
+        by_s: f64,
+        /// Standard deviation, s.
+        std_s: f64,
+        /// In a loop without a plateau only a lower bound of the delay can be found: the contact's
+        /// own damping hides the rest.
+        at_least: bool,
+        /// Stiffness, friction and energy are those of the loop with the delay removed. If both
+        /// this and `at_least` are false, the force looks shifted in time, but no delay makes it a
+        /// friction loop, or damping explains it as well: neither k_T nor μN is reported.
+        corrected: bool,
+    },
+    /// Play (backlash): after each reversal the contact moves by this distance while the force
+    /// stays constant.
+    Play {
+        /// Size of the play, m.
+        size_m: f64,
+        /// Half the difference between the sizes on both strokes, m.
+        std_m: f64,
+    },
+    /// Cycles at the beginning and the end of the record whose amplitude or force differs from that
+    /// of the others were left out.
+    Unsteady {
+        /// Cycles left out at the beginning.
+        left_out_first: usize,
+        /// Cycles left out at the end.
+        left_out_last: usize,
+        /// Cycles used.
+        used: usize,
+        /// Amplitude of Δx at the fundamental in the cycles used, m.
+        amplitude_m: f64,
+        /// Amplitude in the left-out cycle that differs most, m.
+        left_out_amplitude_m: f64,
+    },
+    /// A force proportional to velocity acts in addition to the friction. It is removed from k_T
+    /// and μN.
+    Viscous {
+        /// Viscous damping coefficient, N s/m.
+        viscous_n_s_per_m: f64,
+        /// Standard deviation, N s/m.
+        std_n_s_per_m: f64,
+        /// Its largest force, N.
+        force_n: f64,
+    },
+    /// Mains hum lies at the loop's own frequency, where averaging does not remove it.
+    Hum {
+        /// 50 or 60, Hz.
+        mains_hz: f64,
+        /// The multiple of it that coincides with the loop's frequency, Hz.
+        at_hz: f64,
+        /// The strongest other multiple over the fundamental of the same signal; the error of the
+        /// slope may be as large.
+        part: f64,
+    },
+    /// The plateau's force depends on position: the normal load varies while the contact slides. μN
+    /// is that at the middle.
+    UnevenLoad {
+        /// Change of the friction limit from the middle to the end of the stroke, over that at the
+        /// middle.
+        change: f64,
+        /// Its standard deviation.
+        std: f64,
+    },
+    /// The excitation is not at the stated frequency, or drifts. The cycles were cut at the
+    /// frequency found.
+    FrequencyOff {
+        /// As stated, Hz; `None` if it was found from the record.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        stated_hz: Option<f64>,
+        /// At the record's beginning, Hz.
+        from_hz: f64,
+        /// At its end, Hz.
+        to_hz: f64,
+    },
+}
+
+impl LoopFinding {
+    /// Its name in `results.json`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::ReversedForce { .. } => "reversed-force",
+            Self::LateForce { .. } => "late-force",
+            Self::Play { .. } => "play",
+            Self::Unsteady { .. } => "unsteady",
+            Self::Viscous { .. } => "viscous",
+            Self::Hum { .. } => "hum",
+            Self::UnevenLoad { .. } => "uneven-load",
+            Self::FrequencyOff { .. } => "frequency-off",
+        }
+    }
+}
+
 #[cfg(test)]
 mod faulty_loops_tests;
+
 #[cfg(test)]
 mod loop_bench;
+
 #[cfg(test)]
 mod loops_of_any_size_tests;
+
 #[cfg(test)]
 mod synthetic_tests;

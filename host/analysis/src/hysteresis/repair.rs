@@ -10,7 +10,7 @@
 //! has both flanks and plateaus, τ and c can be separated from each other and from any law of
 //! friction.
 
-use super::loop_analysis::LoopFinding;
+use super::LoopFinding;
 use super::loops::Cycle;
 use nalgebra::{DMatrix, DVector};
 

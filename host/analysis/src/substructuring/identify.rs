@@ -10,7 +10,7 @@ use super::line_noise::LineNoise;
 use super::method::Method;
 pub use super::quality::{Internals, VirtualPointQuality};
 use super::reduced::{Reduced, RefusedReason};
-use super::solve::{Solution, Solutions};
+use super::reduced::{Solution, Solutions};
 use crate::Line;
 use crate::band::Band;
 use crate::frf::common_lines::{self, CommonLines, OtherLines};

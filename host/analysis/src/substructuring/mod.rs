@@ -6,8 +6,8 @@
 //! 1. [`frf`](crate::frf): FRF matrices with named rows and columns, converted to receptances by
 //!    dividing by s = σ + iω.
 //! 2. [`geometry`]: positions of the points and their purpose (`Grouping`).
-//! 3. [`idm`], [`vpt`]: measured points onto the motions of a virtual point ([`virtual_points`]:
-//!    any number of virtual points); [`quality`] measures what is lost.
+//! 3. [`idm`], [`vpt`]: measured points onto the motions of one virtual point, or of any number;
+//!    [`quality`] measures what is lost.
 //! 4. [`decoupling`]: the methods, all returning Z^J per line; [`pseudo_inverse`] inverts
 //!    without truncating.
 //! 5. [`joint_over_bands`]: K and C per line and over bands, with scatter, interval and warnings.
@@ -41,7 +41,6 @@ pub mod geometry;
 pub mod identify;
 pub mod idm;
 mod interface_data;
-mod internal_dofs;
 pub mod joint_over_bands;
 pub mod line_noise;
 pub mod method;
@@ -50,8 +49,6 @@ pub mod pseudo_inverse;
 pub mod quality;
 mod reduced;
 pub mod semm;
-mod solve;
-pub mod virtual_points;
 pub mod vpt;
 
 pub use crate::band::Band;

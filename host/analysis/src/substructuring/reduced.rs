@@ -1,14 +1,19 @@
-//! One IDM set's virtual points with their admittances, line by line.
+//! One IDM set's virtual points with their admittances, line by line; P, Q and M of Eq. (3) with the
+//! related rearrangements (the internal points used, and their matrices); and Z^J of every line by
+//! every requested method.
 
 use super::coupling::BackCoupling;
-use super::decoupling::{ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock};
+use super::decoupling::{
+    ASSEMBLY, DecouplingError, InverseBlock, PrimalBlock, interface, internal, internal_printed, inverse_of,
+    observed_rank, primal_of,
+};
 use super::geometry::Grouping;
 use super::idm::IdmSet;
-use super::interface_data::{Balanced, InterfaceError, MeasuredSet, Side, balance, scaled};
-use super::internal_dofs::Which;
+use super::interface_data::{Balanced, Found, InterfaceError, MeasuredSet, Side, balance, scaled};
 use super::method::Method;
-use super::pseudo_inverse::full_rank_inverse;
-use super::quality::{VirtualPointQuality, consistency, passivity, reciprocity};
+use super::pseudo_inverse::{condition, full_rank_inverse, rank};
+use super::quality::{Internals, VirtualPointQuality, consistency, passivity, reciprocity};
+use super::vpt::reduce_inputs;
 use crate::Line;
 use crate::band::Band;
 use crate::parallel::prelude::*;
@@ -225,5 +230,276 @@ pub(super) fn every_line<T: Send, E>(
         Some(all) => Ok(all),
         // run in order to find the first refusal
         None => (0..lines).map(of).collect(),
+    }
+}
+
+/// The points that count as internal.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Which {
+    /// All points measured on the substructure, including its interface points; A's internal
+    /// responses are spares and are left out.
+    All,
+    /// Grouping 3 and 4 only, as in the paper.
+    Printed,
+}
+
+impl Side {
+    fn impacts(self, which: Which) -> &'static [Grouping] {
+        match (self, which) {
+            (Side::A, Which::All) => &[Grouping::InterfaceA, Grouping::InternalA],
+            (Side::A, Which::Printed) => &[Grouping::InternalA],
+            (Side::B, Which::All) => &[Grouping::InterfaceB, Grouping::InternalB],
+            (Side::B, Which::Printed) => &[Grouping::InternalB],
+        }
+    }
+
+    fn responses(self, which: Which) -> &'static [Grouping] {
+        match (self, which) {
+            (Side::A, Which::All) => &[Grouping::InterfaceA],
+            _ => self.impacts(which),
+        }
+    }
+}
+
+/// One rearrangement of Eq. (1): responses on `seen`, hits on `hit`, at the points that the
+/// assembly's file has too.
+pub(super) struct Rearrangement<'a> {
+    pub(super) seen: Side,
+    pub(super) hit: Side,
+    /// Whether M is inverted (Eq. 3 as printed) instead of P and Q.
+    pub(super) printed: bool,
+    /// Rows in the file of `seen`, and the same in the assembly's file.
+    pub(super) rows: Found,
+    pub(super) rows_ajb: Found,
+    /// Columns in the file of `hit`, and the same in the assembly's file.
+    pub(super) columns: Found,
+    pub(super) columns_ajb: Found,
+    measured_set: &'a MeasuredSet<'a>,
+    pub(super) seen_at: &'a Balanced,
+    pub(super) hit_at: &'a Balanced,
+}
+
+impl<'a> Rearrangement<'a> {
+    /// Responses on `seen` and hits on `hit`; `at` are the virtual points of A and B alone.
+    pub(super) fn of(
+        seen: Side,
+        hit: Side,
+        which: Which,
+        measured_set: &'a MeasuredSet<'a>,
+        at: [&'a Balanced; 2],
+    ) -> Self {
+        let (seen_on, hit_on) = (seen.responses(which), hit.impacts(which));
+        let (columns, columns_ajb) =
+            shared(&measured_set.alone(hit).inputs(hit_on), &measured_set.ajb.inputs(hit_on));
+        let (rows, rows_ajb) =
+            shared(&measured_set.alone(seen).outputs(seen_on), &measured_set.ajb.outputs(seen_on));
+        let printed = which == Which::Printed;
+        let [seen_at, hit_at] = [seen, hit].map(|side| at[side as usize]);
+        Rearrangement {
+            seen,
+            hit,
+            printed,
+            rows,
+            rows_ajb,
+            columns,
+            columns_ajb,
+            measured_set,
+            seen_at,
+            hit_at,
+        }
+    }
+
+    /// P: from the virtual point to the internal responses (n_i × n_c).
+    pub(super) fn p(&self, l: usize) -> Result<Line, InterfaceError> {
+        let cells = self.measured_set.alone(self.seen).cells(l, &self.rows, &self.seen_at.vp.columns)?;
+        Ok(reduce_inputs(&cells, &self.seen_at.t_f))
+    }
+
+    /// Q: from the internal impacts to the virtual point (n_c × n_i).
+    pub(super) fn q(&self, l: usize) -> Result<Line, InterfaceError> {
+        let file = self.measured_set.alone(self.hit);
+        file.reduced_outputs(l, &self.hit_at.t_u, &self.hit_at.vp.rows, &self.columns)
+    }
+
+    /// M: from the internal impacts to the internal responses in the assembly; if both are on one
+    /// substructure, its value alone minus that in the assembly.
+    pub(super) fn m(&self, l: usize) -> Result<Line, InterfaceError> {
+        let assembled = self.measured_set.ajb.cells(l, &self.rows_ajb, &self.columns_ajb)?;
+        if self.seen == self.hit {
+            Ok(self.measured_set.alone(self.seen).cells(l, &self.rows, &self.columns)? - assembled)
+        } else {
+            Ok(assembled)
+        }
+    }
+}
+
+/// The rows (or columns) that both files have, in the order of the first.
+fn shared(first: &Found, second: &Found) -> (Found, Found) {
+    let mut one = Found { names: vec![], points: vec![], at: vec![] };
+    let mut two = Found { names: vec![], points: vec![], at: vec![] };
+    for (i, name) in first.names.iter().enumerate() {
+        if let Some(j) = second.names.iter().position(|n| n == name) {
+            one.names.push(name.clone());
+            one.points.push(first.points[i].clone());
+            one.at.push(first.at[i]);
+            two.names.push(name.clone());
+            two.points.push(second.points[j].clone());
+            two.at.push(second.at[j]);
+        }
+    }
+    (one, two)
+}
+
+/// Z^J per line, with notes for the user.
+pub(super) struct Solution {
+    pub(super) z: Vec<Line>,
+    pub(super) notes: Vec<String>,
+    pub(super) internals: Option<Internals>,
+}
+
+/// Results of all methods.
+pub(super) struct Solutions {
+    /// Y^A and Y^B, rotations in metres; empty if not requested.
+    pub(super) alone: Vec<Vec<Line>>,
+    /// In the order of the methods.
+    pub(super) by_method: Vec<Result<Solution, RefusedReason>>,
+}
+
+/// The operation that a method applies to a line.
+enum Work<'a> {
+    Internals(Box<Rearrangement<'a>>),
+    Interface,
+    Primal(PrimalBlock),
+    Inverse(InverseBlock),
+}
+
+/// A method with notes for the user.
+struct MethodPlan<'a> {
+    work: Work<'a>,
+    notes: Vec<String>,
+    internals: Option<Internals>,
+}
+
+impl Reduced {
+    /// The result or refusal of every method, and Y^A and Y^B if requested.
+    ///
+    /// # Errors
+    /// Y^A or Y^B contains a value that is not finite: then no method works.
+    pub(super) fn solve(
+        &self,
+        measured_set: &MeasuredSet<'_>,
+        methods: &[Method],
+        alone: bool,
+    ) -> Result<Solutions, RefusedReason> {
+        let [y_a, y_b] = self.alone(measured_set)?;
+        let alone = if alone { vec![y_a.clone(), y_b.clone()] } else { Vec::new() };
+        let by_method = methods
+            .iter()
+            .map(|&method| {
+                let MethodPlan { work, notes, internals } = self.plan(measured_set, method)?;
+                Ok(Solution { z: self.z(measured_set, &work)?, notes, internals })
+            })
+            .collect();
+        Ok(Solutions { alone, by_method })
+    }
+
+    /// Z^J of every line. The admittances of the virtual points are computed once for all methods;
+    /// the first line without a result is the refusal.
+    fn z(&self, measured_set: &MeasuredSet<'_>, work: &Work<'_>) -> Result<Vec<Line>, RefusedReason> {
+        let [y_a, y_b] = self.alone(measured_set)?;
+        let d = balance(self.idms);
+        let frf = measured_set.a.frf;
+        let order = frf.quantity().order_of_s();
+        let in_si = |l: usize, z: Result<Line, DecouplingError>| {
+            z.map(|z| scaled(z, &d, frf.s(l).powi(order)))
+                .map_err(|source| Self::refused(measured_set, l, source))
+        };
+        let lines = frf.lines().len();
+        match work {
+            Work::Internals(internals) => {
+                let method = if internals.printed { internal_printed } else { internal };
+                every_line(lines, |l| {
+                    let (p, m, q) = (internals.p(l)?, internals.m(l)?, internals.q(l)?);
+                    in_si(l, method(&y_a[l], &y_b[l], &p, &m, &q))
+                })
+            }
+            Work::Interface => {
+                let y = self.assembly(measured_set)?;
+                every_line(lines, |l| in_si(l, interface(&y_a[l], &y_b[l], &y[l])))
+            }
+            Work::Primal(block) => {
+                let z = self.impedance(measured_set)?;
+                let alone = match block {
+                    PrimalBlock::A => y_a,
+                    PrimalBlock::B => y_b,
+                };
+                every_line(lines, |l| in_si(l, primal_of(*block, &alone[l], &z[l])))
+            }
+            Work::Inverse(block) => {
+                let z = self.impedance(measured_set)?;
+                every_line(lines, |l| in_si(l, Ok(inverse_of(*block, &z[l]))))
+            }
+        }
+    }
+
+    fn plan<'a>(
+        &'a self,
+        measured_set: &'a MeasuredSet<'a>,
+        method: Method,
+    ) -> Result<MethodPlan<'a>, RefusedReason> {
+        let work = match MethodKind::from(method) {
+            MethodKind::Internal(seen, hit, which) => {
+                let internals = Rearrangement::of(seen, hit, which, measured_set, [&self.a, &self.b]);
+                return self.with_internals(measured_set, method, internals);
+            }
+            MethodKind::Interface => Work::Interface,
+            MethodKind::Primal(block) => Work::Primal(block),
+            MethodKind::Inverse(block) => Work::Inverse(block),
+        };
+        self.assembled()?;
+        Ok(MethodPlan { work, notes: Vec::new(), internals: None })
+    }
+
+    /// Both forms of Eq. (3) and the related rearrangements: P, Q from the substructures, M from
+    /// the assembly, at the internals that both have.
+    fn with_internals<'a>(
+        &self,
+        measured_set: &MeasuredSet<'_>,
+        name: Method,
+        internals: Rearrangement<'a>,
+    ) -> Result<MethodPlan<'a>, RefusedReason> {
+        let mut notes = Vec::new();
+        let (n_b, n_a) = (internals.rows.at.len(), internals.columns.at.len());
+        let n_c = self.idms.count();
+        let lines = measured_set.a.frf.lines().len();
+        if n_a.min(n_b) == 0 && lines > 0 {
+            let source = DecouplingError::TooFewInternals { impacts: n_a, responses: n_b, needed: n_c };
+            return Err(Self::refused(measured_set, 0, source));
+        }
+        let found = if lines == 0 {
+            None
+        } else {
+            let middle = lines / 2;
+            let (p, q) = (internals.p(middle)?, internals.q(middle)?);
+            Some(Internals {
+                method: name,
+                idms: n_c,
+                impacts: n_a,
+                responses: n_b,
+                frequency_hz: measured_set.ajb.frf.frequency_hz()[middle],
+                rank_p: rank(&p),
+                rank_q: rank(&q),
+                condition_p: condition(&p),
+                condition_q: condition(&q),
+            })
+        };
+        if internals.printed && lines > 0 && (n_a != n_c || n_b != n_c) {
+            let rank = observed_rank(&internals.p(0)?, &internals.q(0)?);
+            notes.push(format!(
+                "Eq. 3 as printed with {n_a} internal impacts and {n_b} internal responses for {n_c} interface DoFs: Π has rank {rank} of {n_c}, \
+                 so the result is right only for the interface forces that these internals generate, and biased otherwise; `internal` is the exact form"
+            ));
+        }
+        Ok(MethodPlan { work: Work::Internals(Box::new(internals)), notes, internals: found })
     }
 }

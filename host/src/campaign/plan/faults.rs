@@ -2,7 +2,7 @@
 
 use serde::de::DeserializeOwned;
 
-use super::cells::too_many;
+use super::too_many;
 use super::{Plan, PlanError, field};
 
 /// Maximum number of unknown fields reported together: with more, it is another kind of file.

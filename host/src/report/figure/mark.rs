@@ -1,8 +1,8 @@
 //! The contents of a panel: curves, points, bands, words.
 //!
-//! Numbers of curves as compact text: `f32:` and base64 of 32-bit floats, little endian.
-//!
-//! Where the numbers of a mark are in `results.json`.
+//! A mark states in words what it is, its numbers, and where they are in `results.json`
+//! ([`Origin`]). The numbers of curves are written as compact text ([`Packed`]): `f32:` and base64
+//! of 32-bit floats, little endian.
 
 use super::Scene;
 use super::role::Role;

@@ -1,11 +1,9 @@
-//! What marks represent, and the appearance of each role: light and dark, in report, files and
-//! dashboard.
+//! The role of a mark (what it represents), the appearance of each role, light and dark, in report,
+//! files and dashboard; and the axis against which marks are drawn: its quantity, unit and range.
 //!
 //! Colours follow Okabe and Ito, so that colour-blind readers can distinguish them; neighbouring
 //! roles also differ in lightness and dash, so that they remain distinct in grey print. The
 //! contrast with the background is at least 3 : 1 in light and dark, which a test verifies.
-//!
-//! One axis of a panel: its quantity, unit and range.
 
 use serde::Serialize;
 use std::fmt::Write;

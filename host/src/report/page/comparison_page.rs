@@ -1,10 +1,10 @@
 //! The page that compares two campaigns: the verdict, the differences, and the figures of both side
 //! by side with the same axes.
 
-use super::text::Html;
-use super::{figure_html, shell, text};
+use super::{figure_html, shell};
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Source};
 use crate::report::figures;
+use crate::report::html::{Html, list};
 use crate::report::tables;
 use crate::report::words::brief;
 use crate::report::words::number::{micro, short};
@@ -46,7 +46,7 @@ pub fn comparison_page(compared: &Compared, both: [&Results; 2]) -> String {
         figure_html::figure(&mut body, figure, 3);
     }
     body.raw("</section><section id=\"glossary\"><h2>Words</h2>");
-    text::list(&mut body);
+    list(&mut body);
     body.raw("</section></main>");
     shell("Two contacts compared", &banner, simulated, &body.finish(), drawn.iter())
 }

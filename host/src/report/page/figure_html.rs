@@ -1,8 +1,8 @@
 //! A figure in the page: its description, its panels as SVG, its source, and the data from which
 //! the page's script makes it interactive.
 
-use super::text::{Html, escaped};
 use crate::report::figure::{Figure, Height, Panel, Shape, role};
+use crate::report::html::{Html, escaped};
 use crate::report::svg;
 use crate::untrusted_text::shown_json;
 

@@ -1,10 +1,8 @@
-//! The checks on which the credibility of the numbers rests: each with its outcome, its meaning and
-//! its figures.
-//!
-//! Quality of the virtual points.
+//! The checks on which the credibility of the numbers rests, among them the quality of the virtual
+//! points: each with its outcome, its meaning and its figures.
 
 use super::{HtmlTable, key, number, words};
-use crate::report::page::escaped;
+use crate::report::html::escaped;
 use crate::report::words;
 use crate::report::words::number::{count, decimals, short};
 use crate::results::Results;

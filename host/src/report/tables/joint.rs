@@ -3,7 +3,7 @@
 //! failed come last, each with a short reason.
 
 use super::{HtmlTable, TableCell, interval, kind_of, number, remarks, scattered, words};
-use crate::report::page::{escaped, escaped as escape};
+use crate::report::html::{escaped, escaped as escape};
 use crate::report::words as said;
 use crate::report::words::number::{band, micro, short, with_scatter};
 use crate::results::{Joint, MAIN_BAND, Results};

@@ -2,7 +2,7 @@
 //! the cycles of the decay, all levels.
 
 use super::{HtmlTable, number, remarks, scattered, words};
-use crate::report::page::escaped;
+use crate::report::html::escaped;
 use crate::report::words as said;
 use crate::report::words::number::{decimals, micro, short, with_scatter};
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, Shape};

@@ -1,9 +1,8 @@
-//! The tables: HTML text from results. Every number is marked with its path in `results.json`.
-//!
-//! Two campaigns in numbers.
+//! The tables: HTML text from the results of a campaign, or from the differences of two. Every
+//! number is marked with its path in `results.json`.
 
-use super::page::escaped;
 use super::words::number::{decimals, short};
+use crate::report::html::escaped;
 use crate::results::Compared;
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! What was measured, and the provenance of the results.
 
 use super::{HtmlTable, key, number, words};
-use crate::report::page::escaped as escape;
+use crate::report::html::escaped as escape;
 use crate::report::words::number::{count, decimals, short};
 use crate::results::Results;
 use std::fmt::Write;

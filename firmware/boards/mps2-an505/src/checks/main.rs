@@ -7,7 +7,6 @@
 #![no_main]
 
 mod bench;
-mod script;
 
 use core::hint::black_box;
 

@@ -36,12 +36,11 @@ use crate::frf::Frf;
 use crate::frf::noise::shared_by_lines;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::parallel::prelude::*;
-use assembly::Assembly;
+use assembly::{Assembly, SensitivitySums};
 use nalgebra::Complex;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use sensitivity::SensitivitySums;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -49,7 +48,6 @@ pub use bootstrap::{CellHits, Replicates};
 
 mod assembly;
 mod bootstrap;
-mod sensitivity;
 
 /// Largest relative half-width of the lines' unweighted mean, at the typical compliance: above it
 /// the lines contain no information that weights could select.

@@ -8,17 +8,14 @@
 //!
 //! The residual's covariance contains the noise of Y^AJB and, through Eq. (1)'s derivatives, of Y^A
 //! and Y^B, and errors of position, aim and angle with Gaussian priors. The modules: `block`: the
-//! measured data; `cell`: its errors of geometry; `chart`: the parameters; `model`:
-//! Eq. (1) and its derivatives; `problem`: the residuals; `weight`: their covariance; then
-//! `solver`, `outcome`.
+//! measured data and its errors of geometry; `chart`: the parameters; `model`: Eq. (1) and its
+//! derivatives; `problem`: the residuals; `weight`: their covariance (`noise`, `large_matrix`);
+//! then `solver`, `outcome`.
 
-mod assembly_aims;
 mod block;
-mod cell;
 mod chart;
-mod factor;
+mod large_matrix;
 mod model;
-mod narrow;
 mod noise;
 mod outcome;
 mod problem;
@@ -36,8 +33,7 @@ use crate::band::Band;
 use crate::frf::Frf;
 use crate::frf::noise::shared_by_lines;
 use crate::structure::Structure;
-use block::{ReceptanceBlock, Side};
-use cell::Nuisances;
+use block::{Nuisances, ReceptanceBlock, Side};
 use model::Layout;
 use problem::Problem;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! The weights computed naively from the formulas, line by line and cell by cell: the reference for
 //! the fast ones.
 
-use super::cell::CellGeometry;
+use super::block::CellGeometry;
 use super::chart::Chart;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};

@@ -8,13 +8,10 @@
 //! the same for every line.
 
 use super::FitError;
-use super::assembly_aims::Pushes;
-use super::block::ReceptanceBlock;
-use super::cell::CellGeometry;
-use super::cell::{AIMS, Nuisances};
+use super::block::{AIMS, CellGeometry, Nuisances, ReceptanceBlock};
 use super::chart::{At, Chart};
 use super::model::{Layout, Predicted, Slopes, Wanted};
-use super::noise::{ByImpact, Noise};
+use super::noise::{ByImpact, Noise, Pushes};
 use crate::parallel::prelude::*;
 use crate::{C, Line};
 use nalgebra::{Complex, DMatrix, DVector};

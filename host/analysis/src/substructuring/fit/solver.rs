@@ -3,9 +3,8 @@
 
 use super::FitError;
 use super::chart::{Chart, FreeEntries};
-use super::factor::Factor;
+use super::large_matrix::{Factor, crossed};
 use super::model::Layout;
-use super::narrow::crossed;
 use super::problem::{Corrected, Problem};
 use super::weight::{Point, Weight};
 use crate::Line;

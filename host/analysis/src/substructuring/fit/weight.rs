@@ -9,15 +9,11 @@
 //! Effect of every error of geometry on a band's residual, at one set of Y^A and Y^B.
 
 use super::FitError;
-use super::assembly_aims::{AssemblyAims, Met, OfImpact};
-use super::block::ReceptanceBlock;
-use super::cell::AIMS;
-use super::cell::{CellGeometry, factors};
+use super::block::{AIMS, CellGeometry, ReceptanceBlock, factors};
 use super::chart::Chart;
-use super::factor::rows as own_rows;
+use super::large_matrix::{crossed, rows as own_rows};
 use super::model::{Predicted, Slopes, Wanted};
-use super::narrow::crossed;
-use super::noise::{ByImpact, Whitening};
+use super::noise::{AssemblyAims, ByImpact, Met, OfImpact, Whitening};
 use super::problem::{Corrected, Problem};
 use crate::parallel::prelude::*;
 use crate::substructuring::product::product;

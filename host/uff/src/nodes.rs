@@ -1,8 +1,8 @@
-//! Data set 15: nodes, single precision. Format 4I10, 3E13.5.
+//! Data sets 15 and 2411: nodes. The numbers of 15 are in single precision, format 4I10, 3E13.5;
+//! those of 2411 in double precision, 4I10 and, on the next line, 3D25.16.
 
-use super::lines::{Lines, Words, Wrong};
+use super::lines::{Lines, Output, Words, Wrong, integers};
 use super::number;
-use crate::lines::{Output, integers};
 
 /// A node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +19,7 @@ pub struct Node {
     pub position: [f64; 3],
 }
 
+/// The sequence of numbers is the same in both sets.
 pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Node>, Wrong> {
     let mut words = Words::new(lines);
     let mut nodes = Vec::new();
@@ -34,7 +35,7 @@ pub(super) fn read(lines: Lines<'_>) -> Result<Vec<Node>, Wrong> {
     Ok(nodes)
 }
 
-pub(super) fn write(nodes: &[Node], out: &mut Output) -> Result<(), String> {
+pub(super) fn write_single(nodes: &[Node], out: &mut Output) -> Result<(), String> {
     out.open(15, "");
     for node in nodes {
         let line = first_line(node)?;
@@ -48,8 +49,21 @@ pub(super) fn write(nodes: &[Node], out: &mut Output) -> Result<(), String> {
     Ok(())
 }
 
+pub(super) fn write_double(nodes: &[Node], out: &mut Output) -> Result<(), String> {
+    out.open(2411, "");
+    for node in nodes {
+        out.line(&first_line(node)?);
+        for x in node.position {
+            number::print(&mut out.bytes, x, 25, 16);
+        }
+        out.line("");
+    }
+    out.close();
+    Ok(())
+}
+
 /// The integers of a node.
-pub(super) fn first_line(node: &Node) -> Result<String, String> {
+fn first_line(node: &Node) -> Result<String, String> {
     let Node { label, definition_system, displacement_system, color, .. } = *node;
     integers("a number of a node", &[label, definition_system, displacement_system, color], 10)
 }

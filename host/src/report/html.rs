@@ -1,5 +1,5 @@
-//! Builds the page's text as HTML: all text from a file is escaped by [`escaped`], and no number is
-//! separated from its unit by a line break.
+//! Builds the HTML text of page and tables: all text from a file is escaped by [`escaped`], and no
+//! number is separated from its unit by a line break.
 //!
 //! Text between backticks is marked as code. The page contains the glossary, from the text of
 //! `docs/glossary.md`, and the first use of each of its terms is a link to it.
@@ -85,7 +85,7 @@ pub fn unbroken(text: &str) -> String {
 }
 
 /// The glossary: `**term** — meaning`, one paragraph each.
-const GLOSSARY: &str = include_str!("../../../../docs/glossary.md");
+const GLOSSARY: &str = include_str!("../../../docs/glossary.md");
 
 /// Terms with their meanings.
 pub fn terms() -> impl Iterator<Item = (&'static str, &'static str)> {
