@@ -1,5 +1,5 @@
-//! From converter codes to SI units: the channel scales of a session, for trigger, quiet, limits and
-//! amplitudes, and the friction force T from the load cells that ground substructure B.
+//! From converter codes to SI units: the channel scales of a session, for trigger, quiet, limits
+//! and amplitudes, and the friction force T from the load cells that ground substructure B.
 //!
 //! A board is built with nominal sensitivities; a laboratory may have better values. The host sends
 //! these when its session begins, so that control, limits and trigger use the same scales as the

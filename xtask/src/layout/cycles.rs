@@ -16,7 +16,8 @@ use std::path::Path;
 /// cycle to end.
 type Allowed = (&'static str, &'static str, &'static str);
 
-/// The imports that may close a cycle: none at present. A row that closes none any more is reported.
+/// The imports that may close a cycle: none at present. A row that closes none any more is
+/// reported.
 const ALLOWED: [Allowed; 0] = [];
 
 /// For each file, the files it imports, and for each of these the names with the line of their

@@ -12,10 +12,10 @@
 //! 2. **Rotation.** Points on specimen A show its motion as a rigid body; arm B's points show that
 //!    of B.
 //! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells
-//!    together. The motion of the bodies is eliminated at every line (`model`), so that noise in the
-//!    signals that the force is formed from does not pull k_T down. Spots, points, gains, delays,
-//!    the hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]); the local
-//!    resonances of the specimen calibrate them.
+//!    together. The motion of the bodies is eliminated at every line (`model`), so that noise in
+//!    the signals that the force is formed from does not pull k_T down. Spots, points, gains,
+//!    delays, the hammer's tilt and each cell's aim are unknowns with priors ([`ContactPriors`]);
+//!    the local resonances of the specimen calibrate them.
 //!
 //! Modules, in order of use:
 //!

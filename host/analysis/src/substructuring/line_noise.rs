@@ -2,7 +2,7 @@
 //! propagation through virtual points and method.
 //!
 //! Each method consists of sums, products and inverses of the measured blocks, so a small δY
-//! changes Z_dd by Σ g δY + Σ h δY* over the cells. Both g and h are sums of dyads ([`Dyads`]):
+//! changes Z_dd by Σ g δY + Σ h δY* over the cells. Both g and h are sums of dyads (`Dyads`):
 //! δ(A⁻¹) = −A⁻¹ δA A⁻¹ takes a row and a column of A⁻¹, which T_u and T_f transform to the cells.
 //! h is not zero if P or Q is inverted by least squares and the data do not fit (Golub and
 //! Pereyra's derivative of A⁺). Noise is independent between cells, and real and imaginary part

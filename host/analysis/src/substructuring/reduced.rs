@@ -1,6 +1,6 @@
-//! One IDM set's virtual points with their admittances, line by line; P, Q and M of Eq. (3) with the
-//! related rearrangements (the internal points used, and their matrices); and Z^J of every line by
-//! every requested method.
+//! One IDM set's virtual points with their admittances, line by line; P, Q and M of Eq. (3) with
+//! the related rearrangements (the internal points used, and their matrices); and Z^J of every line
+//! by every requested method.
 
 use super::coupling::BackCoupling;
 use super::decoupling::{

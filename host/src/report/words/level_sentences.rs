@@ -1,6 +1,6 @@
-//! Sentences on the records of the shaker: the contact stiffness from a level, or why there is none,
-//! and the lines that `jointrig hysteresis` prints for a time record: every figure of its loop, and
-//! its faults.
+//! Sentences on the records of the shaker: the contact stiffness from a level, or why there is
+//! none, and the lines that `jointrig hysteresis` prints for a time record: every figure of its
+//! loop, and its faults.
 
 use super::names::{BETWEEN_SPOTS, shape_name};
 use super::number::{decimals, prefixed, short, stiffness};
