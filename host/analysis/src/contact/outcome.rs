@@ -309,16 +309,16 @@ pub enum Doubt {
 /// The compliance from a subset of the lines, with all other parameters from all lines: its
 /// difference from the overall estimate, and its standard deviation.
 #[derive(Debug, Clone, Copy)]
-pub struct Part {
+struct Part {
     /// Deviation, m/N.
-    pub deviation: f64,
+    deviation: f64,
     /// Standard deviation, m/N.
-    pub sigma: f64,
+    sigma: f64,
 }
 
 /// The compliance of the lines that `of` selects by block and bin, as an additional parameter next
 /// to all others (score test).
-pub fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> bool) -> Option<Part> {
+fn part(blocks: &[Block], solution: &Solution, of: impl Fn(&Block, f64) -> bool) -> Option<Part> {
     let mut own = 0.0;
     let mut slope = 0.0;
     let mut coupling = DVector::zeros(solution.p.len());
@@ -347,7 +347,7 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
 
 /// Tests every assumption. Aims are not candidates for the largest deviation: on the moving mass
 /// they absorb the effect of shifts of the hammer.
-pub fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
+fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
     let stated = parameters
         .all()
         .iter()
