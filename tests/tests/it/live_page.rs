@@ -243,6 +243,8 @@ fn looking_changes_no_record() {
     let (_alone, unseen) = new();
     done(&mut run(&unseen));
     let (_watched, seen) = new();
+    // before the run, which a browser that starts slowly would otherwise miss
+    let mut browser = Browser::start();
     let mut server = Served::beside(run(&seen).arg("--serve"));
     // ten pages that show everything, two that never read, and others that repeatedly request the
     // most expensive response
@@ -251,7 +253,6 @@ fn looking_changes_no_record() {
         .map(|listener| std::thread::spawn(|| listener.to_the_end()))
         .collect();
     let deaf = server.listener();
-    let mut browser = Browser::start();
     let mut page = browser.open_url(&server.url, Look::DESK);
     let host = format!("127.0.0.1:{}", server.port());
     let mut silent = TcpStream::connect(("127.0.0.1", server.port())).unwrap();
