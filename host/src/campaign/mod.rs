@@ -9,6 +9,7 @@
 //! | what happens between two hits | [`run`]: `cell.rs` |
 //! | a level of the shaker | [`run::shaking`] |
 //! | what observers are notified of | [`watch`] |
+//! | hits and levels from other systems | [`import`] |
 //! | what `verify --deep` recomputes | [`recheck`] |
 //!
 //! [`run::runner::run`] walks the cells of the plan: hammer and laser are moved there
@@ -16,6 +17,7 @@
 //! controlled to the target force ([`run::pulse`]), each record is judged
 //! ([`verdict::judge`](mod@verdict::judge)) and stored on a separate thread (`run/keeper.rs`).
 
+pub mod import;
 pub mod plan;
 pub mod recheck;
 pub mod run;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use crate::advice;
 use crate::analyse::AnalyseError;
+use crate::campaign::import::ImportError;
 use crate::campaign::plan::PlanError;
 use crate::campaign::run::error::RunError;
 use crate::campaign::run::shaking::ShakeError;
@@ -71,6 +72,17 @@ impl From<DeviceError> for CliError {
         match error {
             DeviceError::Address { .. } | DeviceError::NotBuilt { .. } => Self::Usage(error.to_string()),
             other => Self::Device(other),
+        }
+    }
+}
+
+impl From<ImportError> for CliError {
+    /// A cell that the plan does not have is an error of the command line.
+    fn from(error: ImportError) -> Self {
+        match error {
+            ImportError::Store(error) => Self::Store(error),
+            ImportError::NoCell { .. } => Self::Usage(error.to_string()),
+            other => Self::Bad(other.to_string()),
         }
     }
 }

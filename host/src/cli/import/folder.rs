@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use super::names::{Named, NamedFile, from_folder, from_table};
-use super::records::{Brought, CellName, RecordSource, bring, length_notice};
+use super::records::{Brought, bring, length_notice, origin_of};
 use super::{Frfs, bad, frfs};
+use crate::campaign::import::CellName;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::{Judgement, Verdict};
@@ -135,7 +136,7 @@ fn one(
         Named::Cell { configuration, impact, response } => {
             let read = read_record_file(path, units).map_err(bad)?;
             say(path, &read.notes);
-            let origin = RecordSource::of(path, name)?;
+            let origin = origin_of(path, name)?;
             let cell = CellName { configuration, impact, response };
             let brought = bring(store, &origin, &cell, read, replace, &mut |hit, verdict| {
                 say_refused(name, hit, verdict);
@@ -144,7 +145,7 @@ fn one(
             Ok(Some(brought))
         }
         Named::Labelled(configuration) => {
-            let origin = RecordSource::of(path, name)?;
+            let origin = origin_of(path, name)?;
             let wrong = |what: String| bad(format!("{}: {what}", path.display()));
             let geometry = &plan.geometry;
             let is_known = |name: &str| {

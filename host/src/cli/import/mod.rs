@@ -1,6 +1,5 @@
 //! `import`: imports FRFs and impact records measured with other systems.
 
-mod as_recorded;
 mod folder;
 mod names;
 mod records;
@@ -14,6 +13,7 @@ use num_complex::Complex;
 use super::error::CliError;
 use super::output;
 use crate::analyse;
+use crate::campaign::import::CellName;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Verdict;
@@ -23,7 +23,6 @@ use crate::frf::Frf;
 use crate::substructuring::geometry::Configuration as Points;
 use crate::untrusted_text::tell_line;
 use folder::Wishes;
-use records::CellName;
 
 /// Import FRFs or impact records measured with other systems.
 ///

@@ -1,73 +1,31 @@
 //! Imports impact records into one cell of a campaign file.
 
-use std::io::Read;
 use std::path::Path;
 
-use base64::Engine as _;
-use base64::prelude::BASE64_STANDARD;
-use jointrig_protocol::shot::{Phase, Shot};
-use sha2::{Digest, Sha256};
 use toml::Spanned;
 
-use super::as_recorded::as_recorded;
 use super::bad;
 use crate::analyse::AnalysedLength;
-use crate::campaign::plan::{Cell, Plan, configuration_name};
+use crate::campaign::import::as_recorded::as_recorded;
+use crate::campaign::import::{Added, CellName, Hit, Origin, add_hits, find};
+use crate::campaign::plan::{Cell, Plan};
 use crate::campaign::store::Store;
-use crate::campaign::store::notes::utc_now;
-use crate::campaign::store::record_table::{NewRecord, RecordRow};
-use crate::campaign::store::session_table::{Counters, SessionInfo};
-use crate::campaign::store::stored::Hex;
-use crate::campaign::verdict::judge::{ByRecord, Judge};
-use crate::campaign::verdict::others::Others;
-use crate::campaign::verdict::{Judgement, Verdict};
+use crate::campaign::verdict::Judgement;
 use crate::cli::error::CliError;
 use crate::cli::output;
 use crate::device::channels::ChannelMap;
-use crate::device::samples::Samples;
-use crate::device::stream::Recording;
 use crate::exchange::StatedUnits;
 use crate::exchange::record_file::{PlannedPlace, RecordFile};
 use crate::exchange::record_uff::read_record_file;
-use crate::spectra::{Pulse, reversed_peak_n};
-use crate::untrusted_input;
 use crate::untrusted_text::tell_line;
 
-/// The cell that the records belong to.
-pub(super) struct CellName<'n> {
-    pub(super) configuration: &'n str,
-    pub(super) impact: &'n str,
-    pub(super) response: &'n str,
-}
-
-/// Source of the records.
-pub(super) struct RecordSource {
-    /// Name of the file in the campaign file.
-    name: String,
-    /// Digest that identifies its content.
-    digest: String,
-}
-
-impl RecordSource {
-    pub(super) fn of(path: &Path, name: &str) -> Result<Self, CliError> {
-        let failed = |source| CliError::Read { path: path.into(), doing: "reading a file to import", source };
-        let (mut file, size) = untrusted_input::open(path).map_err(failed)?;
-        let (mut digest, mut piece, mut read) = (Sha256::new(), vec![0; 1 << 16], 0u64);
-        loop {
-            let count = file.read(&mut piece).map_err(failed)?;
-            read += count as u64;
-            if count == 0 || read > size {
-                break;
-            }
-            digest.update(&piece[..count]);
-        }
-        let digest = format!("sha256:{}", BASE64_STANDARD.encode(digest.finalize()));
-        Ok(Self { name: name.into(), digest })
-    }
-
-    fn address(&self) -> String {
-        format!("file:{}", self.name)
-    }
+/// The file as the origin of hits, which the campaign file will call `name`.
+pub(super) fn origin_of(path: &Path, name: &str) -> Result<Origin, CliError> {
+    Origin::of_file(path, name).map_err(|source| CliError::Read {
+        path: path.into(),
+        doing: "reading a file to import",
+        source,
+    })
 }
 
 /// Result of an import of records.
@@ -107,7 +65,7 @@ pub(super) fn import(
     }
     let mut store = Store::open(into)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-    let origin = RecordSource::of(file, &called)?;
+    let origin = origin_of(file, &called)?;
     let Brought { hits, kept, already, types, taken, .. } =
         bring(&mut store, &origin, name, read, replace, &mut |hit, verdict| {
             tell_line!("hit {hit}: {} ({})", verdict.kind, verdict.sentence);
@@ -141,83 +99,28 @@ pub(super) fn length_notice(store: &Store) -> Result<Option<String>, CliError> {
     Ok(notice.map(|notice| format!("{}: {notice}", store.path().display())))
 }
 
-/// Judges the hits like measured ones and stores those that are not yet present; reports each
-/// verdict.
+/// Adds the hits of a file of force and responses to a cell; reports each verdict.
 ///
 /// # Errors
-/// There is no such cell, a hit has no pulse, the force has the wrong sign in all hits, or hits of
-/// another file with this name exist and must not be replaced.
+/// As [`add_hits`], or the labels contradict the plan.
 pub(super) fn bring(
     store: &mut Store,
-    origin: &RecordSource,
+    origin: &Origin,
     name: &CellName<'_>,
     read: RecordFile,
     replace: bool,
     tell: &mut dyn FnMut(u32, &Judgement),
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
-    let (id, cell, attempt) = find(store, name)?;
+    let (_, cell, _) = find(store, name)?;
     let wrong = |reason: String| bad(format!("{}: {reason}", origin.name));
     let (read, axes) = along_plan(&plan, &cell, read).map_err(wrong)?;
     let RecordFile { records, delay_s, taken, .. } = read;
-    let records = &records;
-    let (mut map, samples) = as_recorded(records, axes).map_err(wrong)?;
+    let (mut map, samples) = as_recorded(&records, axes).map_err(wrong)?;
     put_in_step(&mut map, &delay_s);
-    let reversed: Vec<Option<f64>> = records.force_n.iter().map(|f| reversed_peak_n(f)).collect();
-    if let (Some(peak_n), true) = (reversed.first().copied().flatten(), reversed.iter().all(Option::is_some))
-    {
-        return Err(wrong(format!(
-            "the force's sign is the wrong way round: peak {peak_n:.1} N; a push is positive, so multiply the force by -1"
-        )));
-    }
-    let types = samples.first().map(Samples::types).unwrap_or_default();
-    let types = map.channels.iter().zip(types).map(|(c, of)| format!("{} {}", c.name, of.name())).collect();
-    let mut recordings: Vec<Recording> = Vec::new();
-    for (hit, own) in samples.into_iter().enumerate() {
-        let pulse = Pulse::locate(&records.force_n[hit]);
-        if pulse.is_none() && reversed[hit].is_none() {
-            return Err(wrong(format!("hit {hit} has no force pulse: remove it")));
-        }
-        recordings.push(recording(hit, own, pulse.as_ref(), records.fs_hz));
-    }
-    let there = already_there(store, origin, id, replace)?;
-    let mut own_session: Option<i64> = None;
-    let mut brought = Brought {
-        cells: 1,
-        hits: recordings.len(),
-        already: there.len(),
-        taken,
-        types,
-        ..Brought::default()
-    };
-    let mut others = Others::of(map.responses().unwrap_or_default());
-    for (hit, recording) in (0..).zip(recordings) {
-        let verdict = ByRecord.judge(&cell, &plan, &map, &recording, &others);
-        if verdict.kind == Verdict::Good {
-            others.learn(&plan, &map, &recording.samples);
-            brought.kept += 1;
-        }
-        tell(hit, &verdict);
-        if !there.contains(&hit) {
-            let session = match own_session {
-                Some(session) => session,
-                None => store.begin_session(&session(origin), &map)?,
-            };
-            own_session = Some(session);
-            let record = NewRecord {
-                cell: id,
-                attempt: attempt + hit,
-                session,
-                utc: utc_now(),
-                // the time of measurement is unknown
-                utc_error_s: None,
-                recording,
-                verdict,
-            };
-            store.insert(&record, &Counters::default())?;
-        }
-    }
-    Ok(brought)
+    let hits = (0..).zip(samples).map(|(number, samples)| Hit::new(number, samples)).collect();
+    let Added { hits, kept, already, types } = add_hits(store, origin, name, &map, hits, replace, tell)?;
+    Ok(Brought { cells: 1, hits, kept, already, types, taken })
 }
 
 /// The records along the directions that the plan defines for the cell, and the number of axes of
@@ -245,106 +148,5 @@ fn put_in_step(map: &mut ChannelMap, delay_s: &[f64]) {
     for (channel, late) in map.channels.iter_mut().zip(late) {
         // less than a sample
         channel.delay_ns = (1e9 * (late - earliest)).round() as u32;
-    }
-}
-
-/// The hits of exactly this file that the cell contains; those of another file with the same name
-/// are dropped, or refused.
-fn already_there(
-    store: &Store,
-    origin: &RecordSource,
-    cell: i64,
-    replace: bool,
-) -> Result<Vec<u32>, CliError> {
-    let sessions = store.sessions()?;
-    let imported = |row: &RecordRow| {
-        let own = sessions.iter().find(|(id, _)| *id == row.session).map(|(_, info)| info);
-        own.filter(|info| info.board == SessionInfo::IMPORTED)
-    };
-    let rows: Vec<RecordRow> = store.records_of(cell)?.into_iter().flatten().collect();
-    let (mut same, mut older) = (Vec::new(), Vec::new());
-    for row in &rows {
-        match imported(row) {
-            Some(info) if info.serial == origin.digest => same.push(row.shot.number),
-            Some(info) if info.address == origin.address() && row.kept() => older.push(row.id),
-            _ => {}
-        }
-    }
-    if !older.is_empty() && !replace {
-        return Err(bad(format!(
-            "{}: {} good hits of this cell came from another file `{}` before: --replace drops those and uses these instead",
-            store.path().display(),
-            older.len(),
-            origin.name
-        )));
-    }
-    for record in older {
-        store.overrule(
-            record,
-            Verdict::Dropped,
-            &format!("replaced by {} ({})", origin.name, origin.digest),
-        )?;
-    }
-    Ok(same)
-}
-
-/// The cell's id, the cell, and its first free attempt number.
-fn find(store: &Store, name: &CellName<'_>) -> Result<(i64, Cell, u32), CliError> {
-    let configuration = store
-        .plan()?
-        .configuration(name.configuration)
-        .map_or(name.configuration, |own| configuration_name(own));
-    let wanted = [configuration, name.impact, name.response];
-    let found = store.cells()?.into_iter().find(|row| {
-        let Cell { configuration, impact, response, .. } = &row.cell;
-        [configuration_name(*configuration), impact, response] == wanted
-    });
-    let Some(row) = found else {
-        return Err(CliError::Usage(format!(
-            "{} has no cell of configuration `{}`, impact `{}`, response `{}`: `jointrig campaign status --json` lists its cells",
-            store.path().display(),
-            wanted[0],
-            wanted[1],
-            wanted[2]
-        )));
-    };
-    let attempts = store.places()?.iter().filter(|r| r.cell == row.id).map(|r| r.attempt + 1).max();
-    Ok((row.id, row.cell, attempts.unwrap_or(0)))
-}
-
-fn session(origin: &RecordSource) -> SessionInfo {
-    SessionInfo {
-        address: origin.address(),
-        board: SessionInfo::IMPORTED.into(),
-        serial: origin.digest.clone(),
-        firmware_version: String::new(),
-        target: String::new(),
-        build: Hex(0),
-        schema_hash: Hex(0),
-    }
-}
-
-fn recording(hit: usize, samples: Samples, pulse: Option<&Pulse>, fs_hz: f64) -> Recording {
-    let start = pulse.map_or(0, |pulse| pulse.start);
-    Recording {
-        epoch: 0,
-        first_scan: 0,
-        trigger_index: start,
-        samples,
-        gaps: Vec::new(),
-        shot: Shot {
-            number: hit as u32,
-            phase: Phase::Done,
-            fired_at: 0,
-            trigger: start as u64,
-            pulse_us: 0,
-            peak_n: pulse.map_or(0.0, |pulse| pulse.peak_n as f32),
-            // the pulse's width determines how much of the record before its trigger is needed
-            width_us: pulse.map_or(0.0, |pulse| (1e6 * pulse.width() as f64 / fs_hz) as f32),
-            rebound_ratio: 0.0,
-            rebound_after: 0,
-            friction_peak_n: 0.0,
-            quiet_ratio: 0.0,
-        },
     }
 }

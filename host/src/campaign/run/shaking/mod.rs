@@ -461,7 +461,7 @@ impl Meter {
                 vec![term(Role::SpecimenA, 1.0 / omega), term(Role::SpecimenB, -1.0 / omega)]
             }
         };
-        let rate_hz = f64::from(channels.rate_hz);
+        let rate_hz = channels.fs_hz();
         Self {
             terms: terms.into_iter().flatten().collect(),
             frequency_hz,
@@ -525,7 +525,7 @@ pub fn record(
     let b = velocity(Role::SpecimenB, "velocity of specimen B")?;
     let (first, _) = *cells.first().ok_or(Unusable("load cell along the sliding direction"))?;
     let late = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
-    let fs_hz = f64::from(channels.rate_hz);
+    let fs_hz = channels.fs_hz();
     let signals = [&[(a, 1.0)][..], &[(b, 1.0)], cells].map(|places| sum(channels, samples, places));
     // all load cells share one amplifier and have the same delay
     let [a_m_per_s, b_m_per_s, force_n] = in_step(signals, [late(a), late(b), late(first)], fs_hz);

@@ -14,10 +14,7 @@ use crate::spectra::{ImpactRecords, MotionQuantity};
 ///
 /// # Errors
 /// The number of responses differs from the plan's, or values are not finite.
-pub(super) fn as_recorded(
-    records: &ImpactRecords,
-    axes: usize,
-) -> Result<(ChannelMap, Vec<Samples>), String> {
+pub fn as_recorded(records: &ImpactRecords, axes: usize) -> Result<(ChannelMap, Vec<Samples>), String> {
     let rate_hz = records.fs_hz.round();
     if !(1.0..=f64::from(u32::MAX)).contains(&rate_hz) {
         return Err(format!("the sampling rate is {} Hz: 1 Hz or more is needed", records.fs_hz));
