@@ -41,7 +41,7 @@ const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
 /// Packages that are used together with the wheel: those of notebooks, engines that read the
 /// columns, and a scheduler.
-const OTHERS: [&str; 9] = [
+const OTHERS: [&str; 13] = [
     "pytest",
     "pytest-xdist",
     "mypy",
@@ -51,6 +51,11 @@ const OTHERS: [&str; 9] = [
     "dask[distributed]",
     "nbclient",
     "ipykernel",
+    // read the formats of docs/recipes.md
+    "npTDMS",
+    "h5py",
+    "lvm_read",
+    "soundfile",
 ];
 
 /// The command that the wheel is compared with.

@@ -50,7 +50,7 @@ const RULES: [Rule; 17] = [
         uses: &["jointrig-protocol", "jointrig-logs", "jointrig-analysis", "jointrig-uff"],
         behind_a_feature: &["jointrig-hil-sim"],
     },
-    rule("jointrig-python", &["jointrig"]),
+    rule("jointrig-python", &["jointrig", "jointrig-protocol"]),
     rule(
         "jointrig-tests",
         &[
