@@ -118,7 +118,8 @@ impl Drop for VirtualBoard {
 fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) {
     let channels: &'static [_] = describe(rig.channels());
     let rate_hz = rig.scan_rate_hz();
-    let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
+    let words = words_per_scan(channels);
+    let per_block = scans_per_block(words).expect("the rig has ten channels or more");
     let slots = ring_slots(rate_hz, per_block);
     let drive = VirtualDrive::default();
     let facts = Facts {
@@ -138,7 +139,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
     let core: Rc<Core<'static, NoopRawMutex>> =
         Rc::new(Core::new(facts, Box::leak(vec![Slot::EMPTY; slots].into_boxed_slice())));
     let rig = Rc::new(RefCell::new(rig));
-    let scans = VirtualScans::new(&rig, &drive, controls, per_block, !options.free_running);
+    let scans = VirtualScans::new(&rig, &drive, controls, [words, per_block], !options.free_running);
     let sampling = scans.sampling();
     let woken = Arc::new(Woken::default());
     let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, drive, link, controls), &woken);
