@@ -22,6 +22,7 @@ use jointrig_firmware::board::Drive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
 use jointrig_protocol::answer::{Info, Reset};
+use jointrig_protocol::channel::words_per_scan;
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 
 use crate::executor::{Poller, Polling, Woken, jump};

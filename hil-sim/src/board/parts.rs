@@ -247,14 +247,7 @@ impl Scans for VirtualScans {
         self.sampling.set(false);
         // the rig advances during lost blocks too
         for _ in 0..=lost {
-            fill(
-                &mut self.rig.borrow_mut(),
-                &self.drive,
-                &self.controls,
-                self.words,
-                self.per_block,
-                block,
-            );
+            fill(&mut self.rig.borrow_mut(), &self.drive, &self.controls, self.words, self.per_block, block);
         }
         Delivered { scans: self.per_block as u8, missed: (lost * self.per_block as u64) as u32, loud: true }
     }

@@ -387,12 +387,7 @@ impl FixedSensors {
 
     /// Converts one scan: `read` fills in the true signals; `codes` and `lower` as for
     /// [`Sensors::convert`].
-    pub(super) fn convert(
-        &mut self,
-        read: impl FnOnce(&mut [f64]),
-        codes: &mut [i16],
-        lower: &mut [i16],
-    ) {
+    pub(super) fn convert(&mut self, read: impl FnOnce(&mut [f64]), codes: &mut [i16], lower: &mut [i16]) {
         read(&mut self.signals);
         for (at, own) in self.own.iter_mut().enumerate() {
             let signal = match &mut own.delay {

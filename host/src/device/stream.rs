@@ -133,13 +133,7 @@ struct Held {
 impl Stream {
     /// An empty stream whose scans have this layout and whose first scan is `first_scan`;
     /// `ring_scans` is the number of scans that the device can send again.
-    pub fn new(
-        epoch: u32,
-        map: u8,
-        first_scan: u64,
-        layout: impl Into<ScanLayout>,
-        ring_scans: u32,
-    ) -> Self {
+    pub fn new(epoch: u32, map: u8, first_scan: u64, layout: impl Into<ScanLayout>, ring_scans: u32) -> Self {
         Self {
             epoch,
             map,

@@ -126,8 +126,14 @@ pub fn tap() -> (Tap, View) {
         slot: Mutex::new(Slot { envelope: empty(), fresh: false }),
         looks: OnceLock::new(),
     });
-    let tap =
-        Tap { shared: shared.clone(), making: empty(), finest: 1, words: 0, open: [NOTHING; MAX_CHANNELS], over: 0 };
+    let tap = Tap {
+        shared: shared.clone(),
+        making: empty(),
+        finest: 1,
+        words: 0,
+        open: [NOTHING; MAX_CHANNELS],
+        over: 0,
+    };
     (tap, View { shared, own: empty() })
 }
 

@@ -34,4 +34,5 @@ mod simulated_truth;
 mod sync;
 mod troubleshooting;
 mod tutorial;
+mod wide_channels;
 mod wrong_files;
