@@ -27,6 +27,7 @@ mod rebounds;
 mod recheck;
 mod report_gaps;
 mod report_page;
+mod round_trip;
 mod rows_of_cells;
 mod same_records;
 mod shaker;
