@@ -99,11 +99,11 @@ impl Friction {
         self.weights = self.columns.component_mul(&self.newtons_per_code.transpose());
     }
 
-    /// The mean of T over some scans with `channels` channels each, N. The raw codes are summed,
+    /// The mean of T over some scans of `words` 16-bit words each, N. The raw codes are summed,
     /// since T is linear in them.
-    pub fn mean_of(&self, codes: &[[u8; 2]], channels: usize) -> f32 {
-        let sums = self.places.map(|place| codes::sum(codes, channels, place) as f32);
-        (self.weights * Vector3::from(sums)).x * channels as f32 / codes.len() as f32
+    pub fn mean_of(&self, codes: &[[u8; 2]], words: usize) -> f32 {
+        let sums = self.places.map(|place| codes::sum(codes, words, place) as f32);
+        (self.weights * Vector3::from(sums)).x * words as f32 / codes.len() as f32
     }
 
     /// T of one scan, N.

@@ -3,6 +3,9 @@
 /// Most channels in one scan: two simultaneous-sampling converters with eight channels each.
 pub const MAX_CHANNELS: usize = 16;
 
+/// Most 16-bit words in one scan: two for each channel if all are wide.
+pub const MAX_WORDS: usize = 2 * MAX_CHANNELS;
+
 /// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits
 /// each.
 pub const BLOCK_SAMPLE_BYTES: usize = 480;
@@ -67,11 +70,11 @@ pub const SCALE_FACTOR_CAP: u32 = 100;
 /// the shaker comes to rest (ms of the device's time).
 pub const LINK_SILENCE_MS: u32 = 1_000;
 
-/// Scans that fit one block of `channels` 16-bit channels; `None` when there are no channels or too
-/// many.
+/// Scans of `words` 16-bit words ([`crate::channel::words_per_scan`]) that fit one block; `None`
+/// when there are none or too many.
 #[must_use]
-pub const fn scans_per_block(channels: usize) -> Option<usize> {
-    if channels == 0 || channels > MAX_CHANNELS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }
+pub const fn scans_per_block(words: usize) -> Option<usize> {
+    if words == 0 || words > MAX_WORDS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * words)) }
 }
 
 #[cfg(test)]
@@ -87,6 +90,7 @@ mod tests {
         assert_eq!(scans_per_block(16), Some(15));
         assert_eq!(scans_per_block(10), Some(24));
         assert_eq!(scans_per_block(0), None);
-        assert_eq!(scans_per_block(17), None);
+        assert_eq!(scans_per_block(MAX_WORDS), Some(7));
+        assert_eq!(scans_per_block(MAX_WORDS + 1), None);
     }
 }

@@ -22,6 +22,7 @@ use jointrig_firmware::board::Drive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
 use jointrig_protocol::answer::{Info, Reset};
+use jointrig_protocol::channel::words_per_scan;
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 
 use crate::executor::{Poller, Polling, Woken, jump};
@@ -118,7 +119,8 @@ impl Drop for VirtualBoard {
 fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) {
     let channels: &'static [_] = describe(rig.channels());
     let rate_hz = rig.scan_rate_hz();
-    let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
+    let words = words_per_scan(channels);
+    let per_block = scans_per_block(words).expect("the rig has ten channels or more");
     let slots = ring_slots(rate_hz, per_block);
     let drive = VirtualDrive::default();
     let facts = Facts {
@@ -138,7 +140,7 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
     let core: Rc<Core<'static, NoopRawMutex>> =
         Rc::new(Core::new(facts, Box::leak(vec![Slot::EMPTY; slots].into_boxed_slice())));
     let rig = Rc::new(RefCell::new(rig));
-    let scans = VirtualScans::new(&rig, &drive, controls, per_block, !options.free_running);
+    let scans = VirtualScans::new(&rig, &drive, controls, [words, per_block], !options.free_running);
     let sampling = scans.sampling();
     let woken = Arc::new(Woken::default());
     let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, drive, link, controls), &woken);

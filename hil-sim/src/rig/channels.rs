@@ -44,6 +44,8 @@ pub struct Channel {
     pub units_per_volt: f64,
     /// Converter range, ± this (V).
     pub range_v: f64,
+    /// Bits of the converter.
+    pub bits: u8,
     /// Delay of the signal (s).
     pub delay_s: f64,
     /// 1, or −1 for a reversed sensor.
@@ -56,7 +58,7 @@ pub struct Channel {
 impl Channel {
     /// Value of one converter step, in the channel's unit.
     pub fn step(&self) -> f64 {
-        self.units_per_volt * self.range_v / 32768.0
+        self.units_per_volt * self.range_v / f64::from(1_u32 << (self.bits - 1))
     }
 }
 
@@ -68,6 +70,7 @@ pub fn channels(sensors: &config::Sensors) -> [Channel; CHANNELS] {
         unit: if quantity == Measured::Force { "N" } else { "m/s" },
         units_per_volt,
         range_v: sensors.range_v,
+        bits: sensors.bits,
         delay_s,
         polarity,
         axis,

@@ -283,8 +283,9 @@ impl Rig {
         Ok(())
     }
 
-    /// Advances exactly one scan period and samples: one code per channel, in order. A shorter
-    /// slice receives the first channels; the end of a longer one is unchanged.
+    /// Advances exactly one scan period and samples: one 16-bit word per channel, in order, then the
+    /// lower words of wide codes ([`jointrig_protocol::block`]). A shorter slice receives the first
+    /// words; the end of a longer one is unchanged.
     pub fn scan(&mut self, codes: &mut [i16]) {
         if let Some(hand) = self.config.hammer.hand
             && self.scans == (hand.every_s * f64::from(self.config.scan_rate_hz)).round() as u64
@@ -305,10 +306,12 @@ impl Rig {
         if self.pending.first().is_some_and(|segment| segment.end_s <= to_s) {
             self.pending.retain(|segment| segment.end_s > to_s);
         }
-        self.sensors.convert(self.truth, codes);
+        let (codes, lower) = codes.split_at_mut(codes.len().min(self.channels.len()));
+        self.sensors.convert(self.truth, codes, lower);
         if self.channels.len() > CHANNELS {
             let stepper = &self.stepper;
-            self.fixed.convert(|into| stepper.fixed(into), codes.get_mut(CHANNELS..).unwrap_or_default());
+            let [codes, lower] = [codes, lower].map(|words| words.get_mut(CHANNELS..).unwrap_or_default());
+            self.fixed.convert(|into| stepper.fixed(into), codes, lower);
         }
     }
 

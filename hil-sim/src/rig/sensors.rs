@@ -1,7 +1,8 @@
 //! The sensors and their errors: from true signals to converter codes.
 //!
-//! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) /
-//! scale. A delay has whole scans and a fraction of one. Noise is drawn for every channel in every
+//! code = round(volts / range · 2^(bits-1)), saturating, volts = (delayed signal · polarity +
+//! noise) / scale; the codes of all channels have 16 bits, or all are wide
+//! ([`jointrig_protocol::block`]). A delay has whole scans and a fraction of one. Noise is drawn for every channel in every
 //! scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain
 //! and skew ([`Flaws`]) are applied before the noise. The errors of a campaign's instruments, also
 //! the true positions of the spots, are keyed to (seed, purpose): the same in every cell and
@@ -19,6 +20,7 @@ use super::hammer::nominal_width_s;
 use super::key::{Stream, normal, stream, uniform};
 use super::probe::{Probe, shifted};
 use super::{config, normalized};
+use jointrig_protocol::channel::{NARROW_BITS, split_code};
 use nalgebra::DVector;
 use num_complex::Complex;
 use std::f64::consts::PI;
@@ -26,6 +28,8 @@ use std::f64::consts::PI;
 /// Converts the true signals to codes.
 #[derive(Debug, Clone)]
 pub struct Sensors {
+    /// Bits of the converters.
+    bits: u8,
     codes_per_unit: [f64; CHANNELS],
     /// Noise (codes rms) of each channel.
     noise: [f64; CHANNELS],
@@ -75,6 +79,7 @@ impl Sensors {
             .map(|(channel, skew_s)| f64::from(flaws.latency_scans) + (channel.delay_s + skew_s) * rate_hz);
         let delays = late_scans.enumerate().filter(|(_, late)| *late > 0.0);
         Self {
+            bits: sensors.bits,
             codes_per_unit,
             noise,
             delays: delays.map(|(at, late)| (at, DelayLine::new(late))).collect(),
@@ -101,9 +106,10 @@ impl Sensors {
         self.cell.reads(hammer, from_s, to_s)
     }
 
-    /// Converts one scan's true signals.
+    /// Converts one scan's true signals: `codes` are 16-bit codes or the upper words of wide codes,
+    /// whose lower words go into `lower`.
     #[inline]
-    pub fn convert(&mut self, mut signals: [f64; CHANNELS], codes: &mut [i16]) {
+    pub fn convert(&mut self, mut signals: [f64; CHANNELS], codes: &mut [i16], lower: &mut [i16]) {
         if let Some(parts) = &self.cross_talk {
             let own = LOAD_CELLS.map(|at| signals[at]);
             for (at, parts) in LOAD_CELLS.into_iter().zip(parts) {
@@ -130,6 +136,12 @@ impl Sensors {
         self.stream = stream;
         for at in 0..CHANNELS {
             exact[at] = signals[at] * self.codes_per_unit[at] + noise[at] * exact[at];
+        }
+        if self.bits > NARROW_BITS {
+            let words = exact.map(|exact| split_code(wide_code(exact, self.bits), self.bits));
+            codes.iter_mut().zip(words).for_each(|(code, [upper, _])| *code = upper);
+            lower.iter_mut().zip(words).for_each(|(code, [_, lower])| *code = lower);
+            return;
         }
         let rounded = exact.map(code);
         let given = codes.len().min(CHANNELS);
@@ -255,7 +267,13 @@ impl DelayLine {
     }
 }
 
-/// Rounded to the nearest code, saturating.
+/// Rounded to the nearest code of a converter of more than 16 bits, saturating.
+fn wide_code(exact: f64, bits: u8) -> i32 {
+    let half = f64::from(1_u32 << (bits - 1));
+    exact.round().clamp(-half, half - 1.0) as i32
+}
+
+/// Rounded to the nearest code of 16 bits, saturating.
 #[inline]
 pub(super) fn code(exact: f64) -> i16 {
     // At 1.5 · 2^52 the last bit of an f64 is one, so the sum rounds and its low bits are the
@@ -310,6 +328,7 @@ pub(super) fn fixed_channels(config: &RigConfig) -> Vec<Channel> {
         unit: "m/s",
         units_per_volt: own.units_per_volt,
         range_v: config.sensors.range_v,
+        bits: config.sensors.bits,
         delay_s: own.delay_s,
         polarity: own.polarity,
         axis: None,
@@ -329,6 +348,7 @@ pub struct FixedRows {
 /// Converts the true signals to codes.
 #[derive(Debug, Clone)]
 pub(super) struct FixedSensors {
+    bits: u8,
     own: Vec<One>,
     signals: Vec<f64>,
     stream: Stream,
@@ -357,7 +377,7 @@ impl FixedSensors {
         };
         let own: Vec<One> =
             config.sensors.fixed.iter().zip(fixed_channels(config)).zip(flaws).map(one).collect();
-        Self { signals: vec![0.0; own.len()], own, stream }
+        Self { bits: config.sensors.bits, signals: vec![0.0; own.len()], own, stream }
     }
 
     /// A hit begins: the noise stream restarts here.
@@ -365,8 +385,9 @@ impl FixedSensors {
         self.stream = stream;
     }
 
-    /// Converts one scan: `read` fills in the true signals.
-    pub(super) fn convert(&mut self, read: impl FnOnce(&mut [f64]), codes: &mut [i16]) {
+    /// Converts one scan: `read` fills in the true signals; `codes` and `lower` as for
+    /// [`Sensors::convert`].
+    pub(super) fn convert(&mut self, read: impl FnOnce(&mut [f64]), codes: &mut [i16], lower: &mut [i16]) {
         read(&mut self.signals);
         for (at, own) in self.own.iter_mut().enumerate() {
             let signal = match &mut own.delay {
@@ -374,8 +395,15 @@ impl FixedSensors {
                 None => self.signals[at],
             };
             let exact = signal * own.codes_per_unit + own.noise * normal(&mut self.stream);
-            if let Some(given) = codes.get_mut(at) {
-                *given = code(exact);
+            let words = if self.bits > NARROW_BITS {
+                split_code(wide_code(exact, self.bits), self.bits)
+            } else {
+                [code(exact), 0]
+            };
+            for (words, word) in [&mut *codes, &mut *lower].into_iter().zip(words) {
+                if let Some(given) = words.get_mut(at) {
+                    *given = word;
+                }
             }
         }
     }

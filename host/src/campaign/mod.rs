@@ -9,6 +9,7 @@
 //! | what happens between two hits | [`run`]: `cell.rs` |
 //! | a level of the shaker | [`run::shaking`] |
 //! | what observers are notified of | [`watch`] |
+//! | what an export holds beside signals, and its way back | [`archive`] |
 //! | hits and levels from other systems | [`import`] |
 //! | what `verify --deep` recomputes | [`recheck`] |
 //!
@@ -17,6 +18,7 @@
 //! controlled to the target force ([`run::pulse`]), each record is judged
 //! ([`verdict::judge`](mod@verdict::judge)) and stored on a separate thread (`run/keeper.rs`).
 
+pub mod archive;
 pub mod import;
 pub mod plan;
 pub mod recheck;

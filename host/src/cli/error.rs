@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use crate::advice;
 use crate::analyse::AnalyseError;
+use crate::campaign::archive::ArchiveError;
+use crate::campaign::archive::restore::RestoreError;
 use crate::campaign::import::ImportError;
 use crate::campaign::plan::PlanError;
 use crate::campaign::run::error::RunError;
@@ -82,6 +84,24 @@ impl From<ImportError> for CliError {
         match error {
             ImportError::Store(error) => Self::Store(error),
             ImportError::NoCell { .. } => Self::Usage(error.to_string()),
+            other => Self::Bad(other.to_string()),
+        }
+    }
+}
+
+impl From<ArchiveError> for CliError {
+    fn from(error: ArchiveError) -> Self {
+        match error {
+            ArchiveError::Store(error) => Self::Store(error),
+            other => Self::Bad(other.to_string()),
+        }
+    }
+}
+
+impl From<RestoreError> for CliError {
+    fn from(error: RestoreError) -> Self {
+        match error {
+            RestoreError::Store(error) => Self::Store(error),
             other => Self::Bad(other.to_string()),
         }
     }

@@ -87,7 +87,7 @@ fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     let channels = session.channels(&info)?;
     let simulated = is_simulated_board(&info.board);
     onlooker.watch.saw(&Seen::Stream { channels: &channels, simulated });
-    let (_, first) = session.start(channels.len())?;
+    let (_, first) = session.start(&channels)?;
     tell_line!("nothing is struck and nothing moves; Ctrl-C ends");
     let (begun, mut told) = (Instant::now(), Instant::now());
     while !stop.load(Ordering::Relaxed) {

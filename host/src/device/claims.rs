@@ -3,7 +3,7 @@
 //! anything moves and before anything is stored.
 
 use jointrig_protocol::answer::{Answer, Counters, Info, Status};
-use jointrig_protocol::channel::Channel;
+use jointrig_protocol::channel::{Channel, WIDE_BITS};
 use jointrig_protocol::event::{self, Event};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, MAX_CHANNELS};
@@ -93,7 +93,9 @@ pub(super) fn of_channel(channel: &Channel, before: &[Channel]) -> Claim {
     refuse(delay_ns <= DELAY_NS, || {
         format!("says that `{name}` lags by {delay_ns} ns: at most {DELAY_NS} are possible")
     })?;
-    refuse((1..=32).contains(&bits), || format!("says that `{name}` has {bits} bits: 1 to 32 are possible"))
+    refuse((1..=WIDE_BITS).contains(&bits), || {
+        format!("says that `{name}` has {bits} bits: 1 to {WIDE_BITS} are possible")
+    })
 }
 
 /// Checks the slow values.

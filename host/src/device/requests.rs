@@ -13,7 +13,7 @@ use super::error::DeviceError;
 use super::inbox::Starting;
 use super::samples::Samples;
 use super::session::{Session, TRIES, patience};
-use super::stream::{Accounts, Stream};
+use super::stream::{Accounts, ScanLayout, Stream};
 use super::tap::Tap;
 use jointrig_protocol::answer::{Answer, Info, Shaker, Status};
 use jointrig_protocol::event::{Event, Reason};
@@ -195,12 +195,13 @@ impl Session {
     }
 
     /// Starts a new stream of scans of `channels` channels; returns its epoch and first scan.
-    pub fn start(&mut self, channels: usize) -> Result<(u32, u64), DeviceError> {
+    pub fn start(&mut self, layout: impl Into<ScanLayout>) -> Result<(u32, u64), DeviceError> {
         if let Some(tap) = self.inbox.stream.take().and_then(Stream::into_tap) {
             self.inbox.tap = Some(tap);
         }
         let (ring_scans, rate_hz) = (self.hello().ring_scans, self.rate_hz);
-        self.inbox.starting = Some(Starting { number: self.next_number, channels, ring_scans, rate_hz });
+        let (number, layout) = (self.next_number, layout.into());
+        self.inbox.starting = Some(Starting { number, layout, ring_scans, rate_hz });
         match self.ask(Request::Start)? {
             Answer::Started { epoch, first_scan, .. } => Ok((epoch, first_scan)),
             other => Err(self.wrong("start", &other)),

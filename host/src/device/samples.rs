@@ -140,6 +140,45 @@ impl ChannelSamples {
         }
     }
 
+    /// The samples whose values in SI units are these, with `units` per sample; the index of the
+    /// first value that no sample of this type has.
+    ///
+    /// A value is a sample times `units`, rounded to double precision. Division gives the sample
+    /// back but for the last digits: a code is the nearest whole number, and a floating-point sample
+    /// is looked for among its neighbours until its product is the value.
+    ///
+    /// # Errors
+    /// The index of that value.
+    pub fn from_si(of: SampleType, units: f64, si: &[f64]) -> Result<Self, usize> {
+        fn all<T>(si: &[f64], one: impl Fn(f64) -> Option<T>) -> Result<Vec<T>, usize> {
+            si.iter().enumerate().map(|(at, value)| one(*value).ok_or(at)).collect()
+        }
+        let code = |value: f64, [low, high]: [i32; 2]| {
+            let code = (value / units).round();
+            (code * units == value && (f64::from(low)..=f64::from(high)).contains(&code)).then_some(code)
+        };
+        Ok(match of {
+            SampleType::I16 => {
+                let range = [i16::MIN.into(), i16::MAX.into()];
+                Self::I16(all(si, |value| code(value, range).map(|code| code as i16))?)
+            }
+            SampleType::I32 => {
+                let range = [i32::MIN, i32::MAX];
+                Self::I32(all(si, |value| code(value, range).map(|code| code as i32))?)
+            }
+            SampleType::F32 => Self::F32(all(si, |value| {
+                let near = (value / units) as f32;
+                let same = |sample: &f32| (f64::from(*sample) * units).to_bits() == value.to_bits();
+                [near, near.next_up(), near.next_down()].into_iter().find(same)
+            })?),
+            SampleType::F64 => Self::F64(all(si, |value| {
+                let near = value / units;
+                let same = |sample: &f64| (sample * units).to_bits() == value.to_bits();
+                [near, near.next_up(), near.next_down()].into_iter().find(same)
+            })?),
+        })
+    }
+
     /// A borrowed view.
     pub fn view(&self) -> ChannelView<'_> {
         match self {
@@ -303,6 +342,39 @@ mod tests {
         assert_eq!(SampleType::I32.extremes(24), Some([-8_388_608, 8_388_607]));
         assert_eq!(SampleType::I32.extremes(32), Some([i32::MIN, i32::MAX]));
         assert_eq!(SampleType::F32.extremes(24), None);
+    }
+
+    #[test]
+    fn samples_come_back_from_si_units_and_other_values_are_told() {
+        // a scale with all digits, and a negative one
+        for units_per_volt in [44.643_21_f32, -0.001_25, 1.0 / 3.0] {
+            let channel = Channel { units_per_volt, ..channel(24) };
+            let all = [
+                ChannelSamples::I16((i16::MIN..=i16::MAX).collect()),
+                ChannelSamples::I32((-8_388_608..8_388_607).step_by(977).collect()),
+                ChannelSamples::F32((1..2_000_u16).map(|i| f32::from(i).sqrt() - 20.0).collect()),
+            ];
+            for samples in all {
+                let of = samples.view().of();
+                let mut si = Vec::new();
+                samples.view().scaled(of.units(&channel), &mut si);
+                assert_eq!(ChannelSamples::from_si(of, of.units(&channel), &si), Ok(samples));
+            }
+            // several samples may have one value in SI units: its own value is what comes back
+            let samples: Vec<f64> = (1..2_000_u16).map(|i| f64::from(i).sqrt() - 20.0).collect();
+            let (mut si, mut again) = (Vec::new(), Vec::new());
+            let units = SampleType::F64.units(&channel);
+            ChannelView::F64(&samples).scaled(units, &mut si);
+            ChannelSamples::from_si(SampleType::F64, units, &si)
+                .expect("there")
+                .view()
+                .scaled(units, &mut again);
+            assert_eq!(si, again);
+        }
+        assert_eq!(ChannelSamples::from_si(SampleType::I16, 0.5, &[1.0, 1.25]), Err(1));
+        assert_eq!(ChannelSamples::from_si(SampleType::I16, 0.5, &[16_384.0]), Err(0));
+        assert_eq!(ChannelSamples::from_si(SampleType::F32, 1.0, &[0.1]), Err(0));
+        assert_eq!(ChannelSamples::from_si(SampleType::I16, 0.5, &[f64::NAN]), Err(0));
     }
 
     #[test]

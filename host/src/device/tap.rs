@@ -105,6 +105,8 @@ pub struct Tap {
     shared: Arc<Shared>,
     making: Box<Envelope>,
     finest: u32,
+    /// 16-bit words per scan; the first ones are the channels' codes.
+    words: usize,
     /// Codes of the current stretch, and how many of its scans are done.
     open: [[i16; 2]; MAX_CHANNELS],
     over: u32,
@@ -124,15 +126,23 @@ pub fn tap() -> (Tap, View) {
         slot: Mutex::new(Slot { envelope: empty(), fresh: false }),
         looks: OnceLock::new(),
     });
-    let tap =
-        Tap { shared: shared.clone(), making: empty(), finest: 1, open: [NOTHING; MAX_CHANNELS], over: 0 };
+    let tap = Tap {
+        shared: shared.clone(),
+        making: empty(),
+        finest: 1,
+        words: 0,
+        open: [NOTHING; MAX_CHANNELS],
+        over: 0,
+    };
     (tap, View { shared, own: empty() })
 }
 
 impl Tap {
-    /// Begins a new stream at `first_scan`; an incomplete envelope is discarded.
-    pub fn begin(&mut self, channels: usize, first_scan: u64, rate_hz: f64) {
+    /// Begins a new stream at `first_scan`, whose scans have `words` 16-bit words, first one of each
+    /// channel; an incomplete envelope is discarded.
+    pub fn begin(&mut self, channels: usize, words: usize, first_scan: u64, rate_hz: f64) {
         let channels = channels.min(MAX_CHANNELS);
+        self.words = words.max(1);
         self.finest = ((FINEST_S * rate_hz).round() as u32).max(1);
         self.restart(channels, first_scan);
     }
@@ -142,17 +152,18 @@ impl Tap {
         (self.open, self.over) = ([NOTHING; MAX_CHANNELS], 0);
     }
 
-    /// Adds the next scans; `codes` holds one scan after another.
+    /// Adds the next scans; `codes` holds the words of one scan after another. Of a wide channel the
+    /// upper 16 bits are shown.
     pub fn fold(&mut self, mut codes: &[i16]) {
         let channels = self.making.channels;
         if channels == 0 {
             return;
         }
-        while codes.len() >= channels {
-            let scans = (codes.len() / channels).min((self.making.scans_per_stretch - self.over) as usize);
-            let (now, rest) = codes.split_at(scans * channels);
-            for scan in now.chunks_exact(channels) {
-                for (channel, code) in scan.iter().enumerate() {
+        while codes.len() >= self.words {
+            let scans = (codes.len() / self.words).min((self.making.scans_per_stretch - self.over) as usize);
+            let (now, rest) = codes.split_at(scans * self.words);
+            for scan in now.chunks_exact(self.words) {
+                for (channel, code) in scan[..channels].iter().enumerate() {
                     let [least, most] = &mut self.open[channel];
                     (*least, *most) = ((*least).min(*code), (*most).max(*code));
                     let wide = i64::from(*code);

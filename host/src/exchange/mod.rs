@@ -13,6 +13,7 @@
 #[cfg(test)]
 mod any_bytes_tests;
 pub mod channel_records;
+pub mod exported;
 pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;

@@ -46,6 +46,9 @@ pub struct NpzFile {
 /// Bytes that a string takes in memory in addition to its characters.
 const NAME: u64 = 56;
 
+/// Most bytes that a compressed byte can become (RFC 1951: 258 for two bits).
+const DEFLATES: u64 = 1032;
+
 /// Bytes of the pieces in which values are read.
 const PIECE: usize = 1 << 16;
 
@@ -57,6 +60,14 @@ impl NpzFile {
     pub fn open(path: &Path) -> Result<Self, NpzError> {
         let (archive, size) = open(path).map_err(|source| NpzError::Open { path: path.into(), source })?;
         Ok(NpzFile { path: path.into(), archive, size, left: untrusted_input::memory_for(size) })
+    }
+
+    /// Allows arrays that take up to `bytes` of memory, for a file whose contents are described
+    /// elsewhere; no file holds more than its size can expand to.
+    #[must_use]
+    pub fn allowing(mut self, bytes: u64) -> Self {
+        self.left = self.left.max(bytes.min(self.size.saturating_mul(DEFLATES)));
+        self
     }
 
     /// Counts the memory that `array` is about to take in the form in which it is returned.

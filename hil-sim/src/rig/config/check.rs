@@ -5,6 +5,7 @@
 use super::{BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side};
 use crate::rig::RigError;
 use crate::rig::channels::{CHANNELS, channels};
+use jointrig_protocol::channel::{NARROW_BITS, WIDE_BITS};
 use jointrig_protocol::limits::MAX_CHANNELS;
 use serde::Deserialize;
 use toml::Spanned;
@@ -228,6 +229,10 @@ fn sensors(config: &RigConfig) -> Result<(), RigError> {
     let sensors = &config.sensors;
     let rate_hz = f64::from(config.scan_rate_hz);
     positive("sensors.range_v", sensors.range_v)?;
+    if sensors.bits != 16 && !(NARROW_BITS + 1..=WIDE_BITS).contains(&sensors.bits) {
+        let least = NARROW_BITS + 1;
+        return Err(bad("sensors.bits", &format!("must be 16, or {least} to {WIDE_BITS}")));
+    }
     let scales = [
         ("sensors.force", sensors.force.units_per_volt),
         ("sensors.vibrometer", sensors.vibrometer.units_per_volt),

@@ -484,12 +484,24 @@ impl Errors {
     }
 }
 
+fn sixteen() -> u8 {
+    16
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_sixteen(bits: &u8) -> bool {
+    *bits == 16
+}
+
 /// All sensors. A channel reads volts × `units_per_volt`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensors {
     /// Converter range, ± this (V).
     pub range_v: f64,
+    /// Bits of the converters: 16, or 19 to 30.
+    #[serde(default = "sixteen", skip_serializing_if = "is_sixteen")]
+    pub bits: u8,
     /// The hammer's force cell.
     pub force: ForceSensor,
     /// The 3-D vibrometer: x, y, z.

@@ -40,6 +40,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
 use crate::device::stream::Accounts;
 use crate::device::stream::Recording;
+use jointrig_protocol::channel::words_per_scan;
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -151,12 +152,12 @@ pub fn run(
             .learn_judged(record.verdict, PulseHit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
     session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
-    let (epoch, _) = session.start(channels.len())?;
+    let (epoch, _) = session.start(&channels)?;
     let shooter = Shooter::new(session, &plan, epoch)?;
     let simulated = is_simulated_board(&info.board);
     options.watch.saw(&Seen::Stream { channels: &channels, simulated });
     options.watch.saw(&Seen::Begun { wanted: tally.wanted(), kept: tally.kept() });
-    let block = jointrig_protocol::limits::scans_per_block(channels.len()).unwrap_or(1);
+    let block = jointrig_protocol::limits::scans_per_block(words_per_scan(&channels.channels)).unwrap_or(1);
     let mut runner = Runner {
         plan: &plan,
         channels: &channels,

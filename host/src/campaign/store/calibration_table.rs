@@ -8,6 +8,7 @@
 use std::cmp::max;
 
 use jointrig_protocol::channel::Channel;
+use serde::{Deserialize, Serialize};
 
 use super::Store;
 use super::error::StoreError;
@@ -18,7 +19,7 @@ use crate::device::channels::ChannelMap;
 
 table! {
     /// New calibration of a channel's sensor; `None` leaves a property unchanged.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     pub struct Calibration {
         "calibrations" {
             "id INTEGER PRIMARY KEY",
@@ -80,6 +81,18 @@ impl Calibration {
     }
 }
 
+/// Applies the calibrations that are valid for a session to its channels.
+pub fn apply_all(calibrations: &[Calibration], session: i64, map: &mut ChannelMap) {
+    for calibration in calibrations.iter().filter(|own| own.from_session <= session) {
+        // samples in SI units come from no known voltage
+        let own =
+            |channel: &&mut Channel| channel.name == calibration.channel.as_str() && channel.range_v > 0.0;
+        if let Some(channel) = map.channels.iter_mut().find(own) {
+            calibration.apply(channel);
+        }
+    }
+}
+
 impl Store {
     /// Enters calibrations for every session from `from_session` onwards. Results are computed with
     /// them from then on; verdicts stay as they were given.
@@ -115,18 +128,7 @@ impl Store {
 
     /// The channels of a session with all calibrations entered so far.
     pub fn calibrated(&self, session: i64, mut map: ChannelMap) -> Result<ChannelMap, StoreError> {
-        for calibration in self.calibrations()? {
-            if calibration.from_session > session {
-                continue;
-            }
-            // samples in SI units come from no known voltage
-            let own = |channel: &&mut Channel| {
-                channel.name == calibration.channel.as_str() && channel.range_v > 0.0
-            };
-            if let Some(channel) = map.channels.iter_mut().find(own) {
-                calibration.apply(channel);
-            }
-        }
+        apply_all(&self.calibrations()?, session, &mut map);
         Ok(map)
     }
 

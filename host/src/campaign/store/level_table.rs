@@ -3,6 +3,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use super::Store;
 use super::codec::{self, CodecError};
 use super::error::StoreError;
@@ -16,7 +18,7 @@ use crate::device::samples::Samples;
 table! {
     /// A stored level without its samples: the columns that the seal covers. One row per recorded
     /// level: a sine in steady state, or a sweep from rest to rest.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     pub struct LevelRow {
         "levels" {
             /// Its id, counted separately from the hammer's records.
@@ -28,20 +30,26 @@ table! {
             /// Before or after the hammer's cells.
             moment: Moment = "moment TEXT NOT NULL",
             /// Its frequency, or the first frequency of a sweep, Hz.
+            #[serde(with = "crate::campaign::store::stored::number")]
             frequency_hz: f64 = "frequency_hz REAL NOT NULL",
             /// The last frequency of a sweep, Hz; `None` for a step.
             end_hz: Option<f64> = "end_hz REAL",
             /// The quantity that is held constant.
             held: Held = "control TEXT NOT NULL",
             /// Ordered amplitude, m, N or V.
+            #[serde(with = "crate::campaign::store::stored::number")]
             amplitude: f64 = "amplitude REAL NOT NULL",
             /// The amplitude over the record, m, N or V.
+            #[serde(with = "crate::campaign::store::stored::number")]
             reached: f64 = "reached REAL NOT NULL",
             /// Largest amplitude while settling, relative to the ordered one.
+            #[serde(with = "crate::campaign::store::stored::number")]
             overshoot: f64 = "overshoot REAL NOT NULL",
             /// Time from the order to the record, s of the device's clock.
+            #[serde(with = "crate::campaign::store::stored::number")]
             after_s: f64 = "settle_s REAL NOT NULL",
             /// The drive's amplitude during the record, V.
+            #[serde(with = "crate::campaign::store::stored::number")]
             drive_v: f64 = "drive_v REAL NOT NULL",
             /// Epoch of the stream that it was cut from.
             epoch: u32 = "epoch INTEGER NOT NULL",
@@ -134,13 +142,13 @@ impl LevelRow {
 }
 
 impl NewLevel {
-    fn row(&self, id: i64, crc: u32, bytes_crc: u32) -> LevelRow {
+    fn row(&self, id: i64, utc: String, crc: u32, bytes_crc: u32) -> LevelRow {
         let (Level { frequency_hz, end_hz, held, amplitude }, settled) = (self.level, self.settled);
         let Settled { reached, overshoot, after_s, drive_v } = settled;
         LevelRow {
             id,
             session: self.session,
-            utc: utc_now(),
+            utc,
             moment: self.moment,
             frequency_hz,
             end_hz,
@@ -165,13 +173,19 @@ impl NewLevel {
 impl Store {
     /// Stores one level permanently; returns its id.
     pub fn insert_level(&self, new: &NewLevel) -> Result<i64, StoreError> {
+        self.insert_level_at(new, utc_now())
+    }
+
+    /// As [`Store::insert_level`], for a level that was stored at the time `utc` (RFC 3339) in
+    /// another file.
+    pub(super) fn insert_level_at(&self, new: &NewLevel, utc: String) -> Result<i64, StoreError> {
         let bytes = codec::encode(&new.samples)
             .map_err(|error| self.content(format!("a level cannot be stored: {error}")))?;
         let (crc, bytes_crc) = (codec::checksum(&new.samples), crc32fast::hash(&bytes));
         self.change("storing a level", |connection| {
             let id: i64 =
                 connection.query_row("SELECT coalesce(max(id), 0) + 1 FROM levels", [], |row| row.get(0))?;
-            let values = new.row(id, crc, bytes_crc).into_values()?;
+            let values = new.row(id, utc, crc, bytes_crc).into_values()?;
             let seal = row_seal::of::<LevelRow>(&values);
             insert::<LevelRow>(connection, "levels", &values, &[("seal", &seal), ("samples", &bytes)])?;
             Ok(id)

@@ -55,6 +55,7 @@ pub mod calibration_table;
 pub mod cell_table;
 mod chain;
 pub mod codec;
+pub mod copied;
 pub mod error;
 pub mod frf_table;
 pub mod level_table;

@@ -15,6 +15,7 @@ use crate::device::samples::{ChannelView, SampleType, Samples};
 use crate::device::stream::Recording;
 use jointrig_protocol::shot::Shot;
 use rusqlite::Connection;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// The index that holds every record's cell and attempt independently of its row.
@@ -197,7 +198,7 @@ impl Store {
 table! {
     /// A stored record without its samples: the columns that the seal covers. One row per shot of
     /// the hammer; without samples if the bolt did not arrive.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     pub struct RecordRow {
         "records" {
             /// Its id.
@@ -223,6 +224,7 @@ table! {
             /// Duration of the coil's pulse, µs.
             pulse_us: u32 = "pulse_us INTEGER NOT NULL",
             /// Peak of the force as measured by the device, N.
+            #[serde(with = "crate::campaign::store::stored::number")]
             device_peak_n: f64 = "peak_n REAL NOT NULL",
             /// The device's summary.
             shot: Shot = "shot TEXT NOT NULL",
@@ -231,8 +233,10 @@ table! {
             /// The original verdict.
             verdict: Verdict = "verdict TEXT NOT NULL",
             /// The measured value that it is based on.
+            #[serde(with = "crate::campaign::store::stored::number")]
             measure: f64 = "measure REAL NOT NULL",
             /// The limit for that value.
+            #[serde(with = "crate::campaign::store::stored::number")]
             limit: f64 = "limit_value REAL NOT NULL",
             /// Both as a sentence.
             sentence: String = "sentence TEXT NOT NULL",
@@ -248,6 +252,7 @@ table! {
         "seals" {
             "record INTEGER PRIMARY KEY REFERENCES records(id)",
             /// Peak of the band-limited force, N; 0 without a pulse.
+            #[serde(with = "crate::campaign::store::stored::number")]
             peak_n: f64 = "peak_n REAL NOT NULL",
             /// Uncertainty of `utc`, ± s; `None` without a clock fit.
             utc_error_s: Option<f64> = "utc_error_s REAL",
@@ -357,7 +362,7 @@ impl NewRecord {
 
 table! {
     /// A verdict that a person overruled.
-    #[derive(Clone, Debug, PartialEq, Eq)]
+    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Overrule {
         "overrules" {
             "id INTEGER PRIMARY KEY",

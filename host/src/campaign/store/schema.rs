@@ -63,7 +63,7 @@ impl Store {
         Ok(store)
     }
 
-    fn fill(&mut self, plan: &Plan, text: &str, source: &str) -> rusqlite::Result<()> {
+    pub(super) fn fill(&mut self, plan: &Plan, text: &str, source: &str) -> rusqlite::Result<()> {
         let transaction = self.connection.transaction()?;
         transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
         transaction.execute_batch(&tables())?;

@@ -11,17 +11,17 @@ use super::error::StoreError;
 use super::notes::utc_now;
 use super::stored::Hex;
 use super::table::{Row, create, table};
-use crate::campaign::plan::Plan;
 use crate::device::channels::ChannelMap;
 use jointrig_protocol::channel::{Channel, Quantity, Role};
 use jointrig_protocol::sync::{Clock, Edge, Line, Sync};
 use rusqlite::{Connection, ToSql, params};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use toml::Spanned;
 
 table! {
     /// The connected device. One row per connection.
-    #[derive(Clone, Debug, PartialEq, Eq)]
+    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
     pub struct SessionInfo {
         "sessions" {
             "id INTEGER PRIMARY KEY",
@@ -77,7 +77,7 @@ table! {
 table! {
     /// The plan's data on the sensor of a channel; sensitivity and polarity are part of the
     /// channel's scale.
-    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub struct Sensor {
         "sensors" {
             "session INTEGER NOT NULL REFERENCES sessions(id)",
@@ -117,15 +117,24 @@ fn exact_rate(session: i64) -> String {
     format!("exact_rate_hz of session {session}")
 }
 
-fn write_session(
+/// When a session began, and which jointrig stored it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Begun {
+    /// When it began, RFC 3339.
+    pub utc: String,
+    /// The version of jointrig.
+    pub software_version: String,
+}
+
+pub(super) fn write_session(
     connection: &Connection,
     info: &SessionInfo,
     map: &ChannelMap,
-    plan: &Plan,
+    begun: &Begun,
+    sensor_of: impl Fn(usize, &Channel) -> Option<Sensor>,
 ) -> rusqlite::Result<i64> {
-    let software = env!("CARGO_PKG_VERSION");
     let beside: [(&str, &dyn ToSql); 3] =
-        [("utc", &utc_now()), ("software_version", &software), ("rate_hz", &map.rate_hz)];
+        [("utc", &begun.utc), ("software_version", &begun.software_version), ("rate_hz", &map.rate_hz)];
     info.clone().insert(connection, &beside)?;
     let session = connection.last_insert_rowid();
     if let Some(exact_hz) = map.exact_hz {
@@ -145,11 +154,8 @@ fn write_session(
         };
         let at: [(&str, &dyn ToSql); 2] = [("session", &session), ("place", &place)];
         columns.insert(connection, &[at[0], at[1], ("unit", &channel.quantity.unit())])?;
-        let named =
-            plan.channel.iter().map(Spanned::get_ref).find(|sensor| sensor.name == channel.name.as_str());
-        if let Some(sensor) = named {
-            let (model, serial) = (sensor.model.clone(), sensor.serial.clone());
-            Sensor { model, serial, calibrated: sensor.calibrated.clone() }.insert(connection, &at)?;
+        if let Some(sensor) = sensor_of(place, channel) {
+            sensor.insert(connection, &at)?;
         }
     }
     Ok(session)
@@ -160,7 +166,16 @@ impl Store {
     /// id.
     pub fn begin_session(&mut self, info: &SessionInfo, channels: &ChannelMap) -> Result<i64, StoreError> {
         let plan = self.plan()?;
-        self.change("noting the session", |connection| write_session(connection, info, channels, &plan))
+        let begun = Begun { utc: utc_now(), software_version: env!("CARGO_PKG_VERSION").into() };
+        let sensor_of = |_: usize, channel: &Channel| {
+            let mut sensors = plan.channel.iter().map(Spanned::get_ref);
+            let own = sensors.find(|sensor| sensor.name == channel.name.as_str())?;
+            let (model, serial) = (own.model.clone(), own.serial.clone());
+            Some(Sensor { model, serial, calibrated: own.calibrated.clone() })
+        };
+        self.change("noting the session", |connection| {
+            write_session(connection, info, channels, &begun, sensor_of)
+        })
     }
 
     /// The channels of one session, with all calibrations entered so far.
@@ -244,7 +259,7 @@ impl Store {
 
 table! {
     /// The clock that timed the scans of a session.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     pub struct ClockRow {
         "clocks" {
             /// The session.
@@ -262,7 +277,7 @@ table! {
 
 table! {
     /// An edge at the sync input or output.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     pub struct EdgeRow {
         "edges" {
             "id INTEGER PRIMARY KEY",
@@ -304,7 +319,7 @@ pub(super) fn tables() -> String {
 }
 
 /// Creates the tables if the file does not have them.
-fn make(connection: &Connection) -> rusqlite::Result<()> {
+pub(super) fn make(connection: &Connection) -> rusqlite::Result<()> {
     if connection.table_exists(None, "clocks")? { Ok(()) } else { connection.execute_batch(&tables()) }
 }
 
@@ -377,7 +392,7 @@ impl Store {
 
 table! {
     /// A temperature at one time in a session.
-    #[derive(Clone, Debug, PartialEq)]
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     pub struct TemperatureRow {
         "temperatures" {
             "id INTEGER PRIMARY KEY",

@@ -6,6 +6,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_protocol::request::Configuration;
 use jointrig_protocol::shot::Shot;
 use rusqlite::types::{Value, ValueRef};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::codec::CodecError;
 use super::table::Stored;
@@ -69,12 +70,27 @@ impl SampleTypes {
     ///
     /// # Errors
     /// There are more or fewer, or an impossible number.
-    pub(super) fn each(&self, channels: usize) -> Result<Vec<SampleType>, CodecError> {
+    pub fn each(&self, channels: usize) -> Result<Vec<SampleType>, CodecError> {
         match &self.0 {
             Some(types) if types.len() == channels => Ok(types.clone()),
             None if channels <= MOST_CHANNELS => Ok(vec![SampleType::I16; channels]),
             _ => Err(CodecError::Types { channels, named: self.0.as_ref().map_or(0, Vec::len) }),
         }
+    }
+
+    /// Their names, separated by spaces; empty if all are i16.
+    fn names(&self) -> String {
+        let types = self.0.iter().flatten();
+        types.map(|of| of.name()).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The types with these names.
+    fn named(names: &str) -> Option<Self> {
+        if names.is_empty() {
+            return Some(Self(None));
+        }
+        let types: Option<Vec<_>> = names.split(' ').map(SampleType::named).collect();
+        types.map(|types| Self(Some(types)))
     }
 
     /// The type of the channel at `place`.
@@ -85,16 +101,67 @@ impl SampleTypes {
 
 impl Stored for SampleTypes {
     fn store(self) -> rusqlite::Result<Value> {
-        let names = |types: Vec<SampleType>| types.into_iter().map(SampleType::name).collect::<Vec<_>>();
-        Ok(self.0.map_or(Value::Null, |types| Value::Text(names(types).join(" "))))
+        Ok(if self.0.is_none() { Value::Null } else { Value::Text(self.names()) })
     }
 
     fn load(value: ValueRef<'_>) -> Option<Self> {
-        if value == ValueRef::Null {
-            return Some(Self(None));
+        match value {
+            ValueRef::Null => Some(Self(None)),
+            // null stands for i16 alone: no names at all are damage
+            other => Self::named(other.as_str().ok().filter(|names| !names.is_empty())?),
         }
-        let types: Option<Vec<_>> = value.as_str().ok()?.split(' ').map(SampleType::named).collect();
-        types.map(|types| Self(Some(types)))
+    }
+}
+
+/// The same forms in JSON.
+macro_rules! text_in_json {
+    ($($type:ty: $write:expr, $read:expr;)+) => {
+        $(impl Serialize for $type {
+            fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                $write(self).serialize(to)
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $type {
+            fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                let text = String::deserialize(from)?;
+                $read(&text).ok_or_else(|| de::Error::custom(format!("`{text}` is not known here")))
+            }
+        })+
+    };
+}
+text_in_json! {
+    Held: |held: &Held| held.name(), |text: &str| text.parse().ok();
+    Moment: |moment: &Moment| moment.name(), |text: &str| text.parse().ok();
+    Hex: Hex::to_string, |text: &str| u64::from_str_radix(text, 16).ok().map(Hex);
+    SampleTypes: SampleTypes::names, SampleTypes::named;
+}
+
+/// Numbers in JSON, which has none that are infinite or undefined: these are written as text.
+pub(crate) mod number {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+    /// A number, or its name.
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Written {
+        Number(f64),
+        Text(String),
+    }
+
+    pub(crate) fn serialize<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
+        let written =
+            if value.is_finite() { Written::Number(*value) } else { Written::Text(value.to_string()) };
+        written.serialize(to)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+        match Written::deserialize(from)? {
+            Written::Number(value) => Ok(value),
+            Written::Text(text) => {
+                text.parse().map_err(|_| de::Error::custom(format!("`{text}` is not a number")))
+            }
+        }
     }
 }
 

@@ -1,13 +1,16 @@
 //! Exports the shaker's levels: the time record of each, and a table of ordered and reached
 //! amplitudes.
 
+use std::collections::HashMap;
 use std::path::Path;
 
+use super::records::write_channels;
 use super::{Format, bad, make_folder};
 use crate::campaign::run::shaking;
 use crate::campaign::store::Store;
 use crate::campaign::store::level_table::{DamagedLevel, LevelRow};
 use crate::cli::error::CliError;
+use crate::exchange::channel_records::ChannelRecords;
 use crate::exchange::typed_table::{Kind, Table, Value};
 use crate::exchange::{tables_output, uff_output, write_level};
 use crate::hysteresis::HysteresisRecord;
@@ -31,16 +34,26 @@ const COLUMNS: [(&str, Kind); 15] = [
     ("file", Kind::Text),
 ];
 
-/// Writes `levels.csv` and, if requested, the records into `folder`; returns the number of levels.
-/// Damaged levels and those with lost samples are in the table but have no file.
+/// The levels that were written.
+#[derive(Default)]
+pub(super) struct Levels {
+    /// Number of levels.
+    pub(super) count: usize,
+    /// The file with all channels of each level, relative to the export.
+    pub(super) channels: HashMap<i64, String>,
+}
+
+/// Writes `levels.csv` and, if requested, the records into `folder`: the loop's signals of each
+/// level, and all its channels as measured. Damaged levels are in the table but have no file, and
+/// those with lost samples have no loop.
 pub(super) fn write(
     store: &Store,
     folder: &Path,
     format: Format,
     with_records: bool,
-) -> Result<usize, CliError> {
+) -> Result<Levels, CliError> {
     if store.levels()?.is_empty() {
-        return Ok(0);
+        return Ok(Levels::default());
     }
     make_folder(folder)?;
     let table = table(store, |row| {
@@ -52,7 +65,26 @@ pub(super) fn write(
         Ok(Some(name))
     })?;
     table.write_csv(&folder.join("levels.csv")).map_err(bad)?;
-    Ok(table.rows().len())
+    let mut written = Levels { count: table.rows().len(), ..Levels::default() };
+    for row in store.levels()?.iter().flatten().filter(|_| with_records) {
+        let name = format!("channels_{}.{}", row.id, format.extension());
+        write_channels(&folder.join(&name), format, &channels(store, row)?)?;
+        written.channels.insert(row.id, format!("levels/{name}"));
+    }
+    Ok(written)
+}
+
+/// All channels of a level as measured, in SI units.
+fn channels(store: &Store, row: &LevelRow) -> Result<ChannelRecords, CliError> {
+    let (map, samples) = (store.channels(row.session)?, store.level_samples(row)?);
+    Ok(ChannelRecords {
+        fs_hz: map.fs_hz(),
+        names: map.channels.iter().map(|channel| channel.name.to_string()).collect(),
+        quantities: map.channels.iter().map(|channel| channel.quantity).collect(),
+        delay_s: vec![map.channels.iter().map(|channel| f64::from(channel.delay_ns) * 1e-9).collect()],
+        records: vec![row.id],
+        signals: vec![(0..map.len()).map(|place| map.to_si(place, samples.channel(place))).collect()],
+    })
 }
 
 /// Ordered and reached amplitudes, level by level; `file` returns the file of each level's samples.

@@ -8,6 +8,7 @@ use super::error::CliError;
 use super::output::Waiting;
 use super::{frf, output};
 use crate::analyse::{CampaignFile, KnownContact, LINES_HZ, Progress, Wanted};
+use crate::campaign::archive::{self, Exported};
 use crate::campaign::store::Store;
 use crate::campaign::store::record_table::RecordRow;
 use crate::exchange::tables_output::write_positions;
@@ -22,6 +23,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+use records::Records;
 
 #[cfg(feature = "parquet")]
 mod columns;
@@ -40,8 +43,9 @@ mod tables;
 /// its original and current verdict, when and why it was overruled, and its place in these files;
 /// DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
 /// level of the shaker (velocities of both specimens and the load cells' sum, aligned in time; npz
-/// as `jointrig hysteresis` reads it) and levels.csv with ordered and reached amplitudes.
-/// DIR/results.json and report.html.
+/// as `jointrig hysteresis` reads it), one with all its channels, and levels.csv with ordered and reached amplitudes.
+/// DIR/results.json and report.html. DIR/plan.toml and archive.json: the plan, and everything else
+/// of the file, with which `jointrig import DIR --into NEW.jrig` makes the same campaign again.
 ///
 /// --format parquet: columns for engines such as DuckDB, Polars and Spark. The tables are Parquet
 /// files, frf.parquet has one row for each line, estimates.parquet one for each stiffness, and the
@@ -183,8 +187,8 @@ impl Files<'_> {
         let plan = store.plan()?;
         let geometry = analyse::geometry(&plan);
         write_positions(&folders[0], &geometry, "Velocity").map_err(bad)?;
-        let written = if *without_records { Vec::new() } else { self.write_records(&store)? };
-        tables::write(&store, out, &written)?;
+        let records = if *without_records { Records::default() } else { self.write_records(&store)? };
+        let mut tables = tables::write(&store, out, &records.written)?;
         let WithFrfs { frfs, mut told, results } = analysed(&store, self.what.band)?;
         // each file is compressed on one core: write all in parallel, together with the report,
         // starting with the last, the assembly's, which is the largest
@@ -200,9 +204,17 @@ impl Files<'_> {
         told.extend(frfs_told?.into_iter().rev());
         let folder = out.join("levels");
         let levels = levels::write(&store, &folder, self.format, !without_records)?;
-        if levels > 0 {
-            told.push(format!("{}: {levels} levels of the shaker", folder.display()));
+        if levels.count > 0 {
+            tables.push("levels/levels.csv".into());
+            told.push(format!("{}: {} levels of the shaker", folder.display(), levels.count));
         }
+        let exported = Exported {
+            with_records: !without_records,
+            records: records.places,
+            levels: levels.channels,
+            tables,
+        };
+        archive::write(&store, out, &exported)?;
         told.push(format!("geometry, results.json and report.html are in {}", out.display()));
         output::lines(told)
     }

@@ -1,11 +1,13 @@
 //! Exports the impact records: for each cell one file with force and response and one with its
 //! other channels, and a table of all records.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use jointrig_protocol::channel::{Quantity, Role};
 
 use super::{Files, Format, bad, make_folder};
+use crate::campaign::archive::Place;
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
@@ -18,6 +20,13 @@ use crate::exchange::{tables_output, uff_output, write_impacts};
 use crate::spectra::{ImpactRecords, MotionQuantity};
 use crate::untrusted_text::file_name;
 
+/// The records that were written: their place in the tables, and in the archive.
+#[derive(Default)]
+pub(super) struct Records {
+    pub(super) written: Vec<Written>,
+    pub(super) places: HashMap<i64, Place>,
+}
+
 /// Place of a record in its cell's file.
 pub(super) struct Written {
     pub(super) record: i64,
@@ -29,17 +38,20 @@ pub(super) struct Written {
 /// Force and response of a cell's hits, and the other channels.
 struct OfCell {
     impacts: ImpactRecords,
+    /// Those of the hits struck for this cell; `None` if they have none.
     others: Option<ChannelRecords>,
+    /// Indices of force and responses among the channels of each hit.
+    places: Vec<Vec<usize>>,
 }
 
 impl Files<'_> {
     /// Writes one file for each cell that has hits to be written; returns the place of each record.
-    pub(super) fn write_records(&self, store: &Store) -> Result<Vec<Written>, CliError> {
+    pub(super) fn write_records(&self, store: &Store) -> Result<Records, CliError> {
         let [folder, others] = ["records", "channels"].map(|name| self.what.out.join(name));
         let (rows, cells, shared) = (store.records()?, store.cells()?, store.rows()?);
         let plan = store.plan()?;
         let waiting = Waiting::of("writing records, by cell");
-        let mut written = Vec::new();
+        let mut all = Records::default();
         for (done, cell) in cells.iter().enumerate() {
             waiting.at(done, cells.len());
             let struck = [Some(cell.id), shared.lead(cell.id)];
@@ -50,19 +62,21 @@ impl Files<'_> {
             // names may contain dots: append the extension instead of replacing one
             let name = format!("{}.{}", stem(cell), self.format.extension());
             self.write_impacts(&folder.join(&name), &of_cell.impacts, cell)?;
-            // the other channels are written only for the cell that was struck
-            if let Some(all) = of_cell.others.as_ref().filter(|_| shared.lead(cell.id).is_none()) {
-                self.write_others(&others, &name, all)?;
+            let beside = of_cell.others.as_ref();
+            if let Some(channels) = beside {
+                self.write_others(&others, &name, channels)?;
             }
-            written.extend(
-                own.iter().enumerate().filter(|(_, row)| row.cell == cell.id).map(|(hit, row)| Written {
-                    record: row.id,
-                    file: format!("records/{name}"),
-                    hit,
-                }),
-            );
+            for ((hit, row), channels) in own.iter().enumerate().zip(of_cell.places) {
+                if row.cell != cell.id {
+                    continue;
+                }
+                let file = format!("records/{name}");
+                all.written.push(Written { record: row.id, file: file.clone(), hit });
+                let others = beside.map(|_| format!("channels/{name}"));
+                all.places.insert(row.id, Place { file, hit, channels, others });
+            }
         }
-        Ok(written)
+        Ok(all)
     }
 
     /// All records of a cell in SI units; `None` if it has none.
@@ -74,6 +88,7 @@ impl Files<'_> {
         rows: &[&RecordRow],
     ) -> Result<Option<OfCell>, CliError> {
         let mut out: Option<OfCell> = None;
+        let id = cell.id;
         for row in rows {
             let wrong = |what: &str| {
                 Err(CliError::Bad(format!("{}: record {} {what}", self.what.file.display(), row.id)))
@@ -96,19 +111,26 @@ impl Files<'_> {
             let quantities: Vec<Quantity> = further.iter().map(|p| map.channels[*p].quantity).collect();
             let cell = out.get_or_insert_with(|| OfCell {
                 impacts: ImpactRecords { fs_hz, force_n: Vec::new(), response: Vec::new(), quantity },
-                others: (!names.is_empty()).then(|| ChannelRecords {
+                others: None,
+                places: Vec::new(),
+            });
+            // of the hits of another cell that fill this one, that cell's file has the others
+            let own = row.cell == id && !names.is_empty();
+            if own && cell.others.is_none() {
+                cell.others = Some(ChannelRecords {
                     fs_hz,
                     names: names.clone(),
                     quantities: quantities.clone(),
                     delay_s: Vec::new(),
                     records: Vec::new(),
                     signals: Vec::new(),
-                }),
-            });
-            let same = cell
-                .others
-                .as_ref()
-                .map_or(names.is_empty(), |all| (&all.names, &all.quantities) == (&names, &quantities));
+                });
+            }
+            let same = row.cell != id
+                || cell
+                    .others
+                    .as_ref()
+                    .map_or(names.is_empty(), |all| (&all.names, &all.quantities) == (&names, &quantities));
             if (cell.impacts.fs_hz, cell.impacts.quantity) != (fs_hz, quantity) || !same {
                 return wrong(
                     "differs from the earlier records of its cell in sampling rate, quantity or channels: export --without-records",
@@ -118,7 +140,8 @@ impl Files<'_> {
             let si = |place: &usize| map.to_si(*place, samples.channel(*place));
             cell.impacts.force_n.push(si(&force));
             cell.impacts.response.push(axes.iter().map(si).collect());
-            if let Some(all) = &mut cell.others {
+            cell.places.push(std::iter::once(force).chain(axes.iter().copied()).collect());
+            if let Some(all) = cell.others.as_mut().filter(|_| own) {
                 let late = |place: &usize| f64::from(map.channels[*place].delay_ns) * 1e-9;
                 all.delay_s.push(further.iter().map(late).collect());
                 all.records.push(row.id);
@@ -140,11 +163,16 @@ impl Files<'_> {
     fn write_others(&self, folder: &Path, name: &str, all: &ChannelRecords) -> Result<(), CliError> {
         make_folder(folder)?;
         let path: PathBuf = folder.join(name);
-        match self.format {
-            Format::Npz => channel_records::write_npz(&path, all).map_err(bad),
-            Format::Uff58 => channel_records::write_uff_file(&path, all).map_err(bad),
-            Format::Csv => channel_records::write_csv(&path, all).map_err(bad),
-        }
+        write_channels(&path, self.format, all)
+    }
+}
+
+/// Writes channels in SI units.
+pub(super) fn write_channels(path: &Path, format: Format, all: &ChannelRecords) -> Result<(), CliError> {
+    match format {
+        Format::Npz => channel_records::write_npz(path, all).map_err(bad),
+        Format::Uff58 => channel_records::write_uff_file(path, all).map_err(bad),
+        Format::Csv => channel_records::write_csv(path, all).map_err(bad),
     }
 }
 

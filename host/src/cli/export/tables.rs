@@ -284,17 +284,21 @@ pub(super) fn channels(store: &Store) -> Result<Table, CliError> {
     Ok(table)
 }
 
-/// Writes `records.csv`, `channels.csv` and, if there are any, `calibrations.csv` and `edges.csv`.
-pub(super) fn write(store: &Store, folder: &Path, written: &[Written]) -> Result<(), CliError> {
-    records(store, written)?.write_csv(&folder.join("records.csv")).map_err(bad)?;
-    channels(store)?.write_csv(&folder.join("channels.csv")).map_err(bad)?;
-    let seen = edges(store)?;
-    if !seen.rows().is_empty() {
-        seen.write_csv(&folder.join("edges.csv")).map_err(bad)?;
+/// Writes `records.csv`, `channels.csv` and, if there are any, `calibrations.csv` and `edges.csv`;
+/// returns their names.
+pub(super) fn write(store: &Store, folder: &Path, written: &[Written]) -> Result<Vec<String>, CliError> {
+    let mut names = Vec::new();
+    let mut put = |name: &str, table: &Table| {
+        table.write_csv(&folder.join(name)).map_err(bad)?;
+        names.push(name.to_owned());
+        Ok::<(), CliError>(())
+    };
+    put("records.csv", &records(store, written)?)?;
+    put("channels.csv", &channels(store)?)?;
+    for (name, table) in [("edges.csv", edges(store)?), ("calibrations.csv", calibrations(store)?)] {
+        if !table.rows().is_empty() {
+            put(name, &table)?;
+        }
     }
-    let entered = calibrations(store)?;
-    if entered.rows().is_empty() {
-        return Ok(());
-    }
-    entered.write_csv(&folder.join("calibrations.csv")).map_err(bad)
+    Ok(names)
 }

@@ -1,5 +1,6 @@
 //! `import`: imports FRFs and impact records measured with other systems.
 
+mod exported;
 mod folder;
 mod names;
 mod records;
@@ -13,6 +14,7 @@ use num_complex::Complex;
 use super::error::CliError;
 use super::output;
 use crate::analyse;
+use crate::campaign::archive::restore::is_archive;
 use crate::campaign::import::CellName;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
@@ -33,7 +35,11 @@ use folder::Wishes;
 /// a campaign file, with --impact and --response in addition; every hit is judged like a measured
 /// one.
 ///
-/// A folder is imported into a campaign file with --into alone: files named
+/// A folder that `jointrig export` wrote is imported as a whole with --into alone: plan, sessions,
+/// records with all channels and verdicts, levels, calibrations, notes. The campaign file is made if
+/// it does not exist, and its analysis gives the same results.
+///
+/// Any other folder is imported into a campaign file with --into alone: files named
 /// CONFIGURATION_IMPACT_RESPONSE are cells, files named CONFIGURATION contain FRFs, and universal
 /// files may name impact and response in their labels; for all others a table (--names) states the
 /// content. The import adds to existing data; what is already present is not stored again, so the
@@ -81,6 +87,9 @@ impl Import {
     pub fn run(self) -> Result<(), CliError> {
         let (replace, units) = (self.replace, &self.units);
         match (&self.out, &self.into, &self.configuration, &self.impact, &self.response) {
+            (None, Some(into), None, None, None) if self.names.is_none() && is_archive(&self.file) => {
+                exported::import(&self.file, into)
+            }
             (None, Some(into), configuration, None, None) if self.file.is_dir() => {
                 let (configuration, names) = (configuration.as_deref(), self.names.as_deref());
                 folder::import(&self.file, into, &Wishes { configuration, names, replace, units })
