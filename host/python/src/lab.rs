@@ -136,7 +136,7 @@ impl Lab {
 
     /// Adds the hits of one cell; jointrig's stub file describes the arguments.
     #[pyo3(signature = (configuration, impact, response=None, *, fs_hz, channels, force_n=None, units=None, scale=None,
-                        delay_s=None, source="python", replace=false))]
+                        delay_s=None, trigger_index=None, source="python", replace=false))]
     #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
     fn add_hits<'py>(
         &self,
@@ -150,12 +150,13 @@ impl Lab {
         units: Option<Bound<'py, PyDict>>,
         scale: Option<Bound<'py, PyDict>>,
         delay_s: Option<Bound<'py, PyDict>>,
+        trigger_index: Option<usize>,
         source: &str,
         replace: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let given = Stated { force_n, channels, units, scale, delay_s }.given(py, &["hit", "sample"])?;
         let cell = (configuration, impact, response);
-        let (added, verdicts) = writing::add_hits(py, &self.path, cell, fs_hz, &given, source, replace)?;
+        let (added, verdicts) = writing::add_hits(py, &self.path, cell, fs_hz, &given, trigger_index, source, replace)?;
         let found = PyDict::new(py);
         found.set_item("hits", added.hits)?;
         found.set_item("kept", added.kept)?;

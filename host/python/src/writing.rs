@@ -272,12 +272,14 @@ fn failed(py: Python<'_>, path: &Path, error: &ImportError) -> PyErr {
 
 /// Adds the hits of one cell (configuration, impact, response); returns their counts, and verdict
 /// and sentence of each.
+#[allow(clippy::too_many_arguments, reason = "Python names each of them")]
 pub fn add_hits(
     py: Python<'_>,
     path: &Path,
     (configuration, impact, response): (&str, &str, Option<&str>),
     fs_hz: f64,
     channels: &[Given<'_>],
+    trigger_index: Option<usize>,
     source: &str,
     replace: bool,
 ) -> PyResult<(Added, Vec<(&'static str, String)>)> {
@@ -295,7 +297,8 @@ pub fn add_hits(
     let mut verdicts = Vec::new();
     let added = py.detach(|| {
         let origin = origin(source, &map, &all);
-        let hits = (0..).zip(all).map(|(number, samples)| Hit::new(number, samples)).collect();
+        let of = |(number, samples)| Hit { trigger_index, ..Hit::new(number, samples) };
+        let hits = (0..).zip(all).map(of).collect();
         let mut store = Store::open(path)?;
         let cell = CellName { configuration, impact, response: &response };
         let mut tell = |_, verdict: &Judgement| {

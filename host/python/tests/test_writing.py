@@ -1,6 +1,5 @@
 """Hits and levels that Python adds are judged and stored as the command's."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,8 @@ def empty(folder: Path) -> jr.Lab:
 
 
 def arrays(records: list[jr.Record], *, codes: bool) -> dict[str, np.ndarray]:
-    read = (lambda record, name: record.samples(name)) if codes else (lambda record, name: record.signal(name))
-    return {name: np.stack([read(record, name) for record in records]) for name in records[0].channels}
+    names = records[0].channels
+    return {name: np.stack([record.samples(name) if codes else record.signal(name) for record in records]) for name in names}
 
 
 @pytest.mark.parametrize("codes", [True, False])
@@ -35,11 +34,13 @@ def test_a_campaign_can_be_written_again(small_file: Path, tmp_path: Path, codes
         first = records[0]
         scale = {name: first.scale(name) for name in channels} if codes else None
         added = lab.add_hits(*cell, fs_hz=first.fs_hz, channels=channels, units=UNITS, scale=scale,
-                             delay_s={name: first.delay_s(name) for name in channels})  # fmt: skip
+                             delay_s={name: first.delay_s(name) for name in channels},
+                             trigger_index=first.trigger_index)  # fmt: skip
         assert [verdict for verdict, _ in added["verdicts"]] == [record.verdict for record in records], cell
         assert (added["hits"], added["already"]) == (len(records), 0)
         again = lab.add_hits(*cell, fs_hz=first.fs_hz, channels=channels, units=UNITS, scale=scale,
-                             delay_s={name: first.delay_s(name) for name in channels})  # fmt: skip
+                             delay_s={name: first.delay_s(name) for name in channels},
+                             trigger_index=first.trigger_index)  # fmt: skip
         assert again["already"] == len(records)
         stored = lab.records(configuration=cell[0], impact=cell[1], response=cell[2])
         assert len(stored) == len(records)
@@ -49,8 +50,13 @@ def test_a_campaign_can_be_written_again(small_file: Path, tmp_path: Path, codes
                 # a scale is stored in single precision
                 assert np.allclose(ours.signal(name), theirs.signal(name), rtol=1e-7 if codes else 0, atol=0), name
     assert lab.status()["kept"] == measured.status()["kept"] > 0
-    ours, theirs = lab.frf("AJB"), measured.frf("AJB")
-    assert np.abs(ours.frf / theirs.frf - 1).max() < 1e-5
+    written, original = lab.frf("AJB"), measured.frf("AJB")
+    assert (written.outputs, written.inputs) == (original.outputs, original.inputs)
+    # imported records are used from their pulse on, so their lines lie a little closer: 0.003 Hz at the end of a line
+    common = original.frequency_hz[::20]
+    for output, input_ in np.ndindex(original.frf.shape[1:]):
+        one, other = (np.interp(common, y.frequency_hz, y.frf[:, output, input_]) for y in (written, original))
+        assert np.abs(one - other).max() < 0.01 * np.abs(other).max(), (output, input_)
     command("campaign", "verify", lab.path, "--deep")
 
 
@@ -95,8 +101,7 @@ def test_a_level_is_measured_from_its_samples(tmp_path: Path) -> None:
     added = lab.add_level(100, 2e-6, fs_hz=fs_hz, channels=channels, units=units)
     assert abs(added["reached"] / 2e-6 - 1) < 1e-3 and not added["already"]
     assert lab.add_level(100, 2e-6, fs_hz=fs_hz, channels=channels, units=units)["already"]
-    found = json.loads(command("info", lab.path, "--json").stdout)
-    assert "levels" not in found or found["levels"]
+    command("campaign", "verify", lab.path, "--deep")
     with pytest.raises(jr.Refused, match="velocities of both specimens"):
         lab.add_level(100, 2e-6, fs_hz=fs_hz, channels={"LC1": channels["LC1"]}, units={"LC1": "N"})
     with pytest.raises(jr.Refused, match="held is `speed`"):

@@ -32,11 +32,12 @@ class Lab:
         response: str | None = None,
         *,
         fs_hz: float,
-        channels: dict[str, ArrayLike],
+        channels: dict[str, Any],
         force_n: ArrayLike | None = None,
         units: dict[str, str] | None = None,
         scale: dict[str, float] | None = None,
         delay_s: dict[str, float] | None = None,
+        trigger_index: int | None = None,
         source: str = "python",
         replace: bool = False,
     ) -> dict[str, Any]:
@@ -46,7 +47,8 @@ class Lab:
         is, as in the plan or in exports: force, x, y, z of the response location, LDV_A, LDV_B, LC1 ..., or a fixed sensor's
         channel; any other is recorded without a use. force_n: the hammer's force in N, the same as channels={"force": ...}.
         units: name -> N, m/s, mm/s, g, V ...; scale: name -> units per sample, for codes; delay_s: name -> how late, s.
-        response may be left out where all locations have fixed sensors. Returns hits, kept, already (stored by an earlier call
+        trigger_index: the sample at which the recorder was triggered; hits whose pulse begins elsewhere are refused. Left out,
+        each record is aligned by its pulse. response may be left out where all locations have fixed sensors. Returns hits, kept, already (stored by an earlier call
         with the same arrays) and verdicts, a list of (verdict, sentence). source names the origin in the file; replace drops
         the good hits that came from another content with this name. Raises Refused, and stores nothing then.
         """
@@ -56,7 +58,7 @@ class Lab:
         amplitude: float,
         *,
         fs_hz: float,
-        channels: dict[str, ArrayLike],
+        channels: dict[str, Any],
         units: dict[str, str] | None = None,
         scale: dict[str, float] | None = None,
         delay_s: dict[str, float] | None = None,
