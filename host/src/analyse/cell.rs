@@ -60,6 +60,17 @@ pub struct Hit {
     pub response_delay_s: Vec<f64>,
     /// The signals at the contact, if the rig has them.
     pub contact: Option<ContactSignals>,
+    /// The load cells' sum of a rig without vibrometers next to the contact.
+    pub load_cells: Option<LoadCellSignal>,
+}
+
+/// Sum of the load cells during one hit, where no vibrometers measure next to the contact.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LoadCellSignal {
+    /// Sum of the load cells, N.
+    pub tangential_n: Vec<f64>,
+    /// Its delay relative to the hammer's force, s.
+    pub delay_s: f64,
 }
 
 /// The signals at the contact during one hit.
@@ -149,6 +160,11 @@ pub trait Measurements: Sync {
     /// Prior knowledge of positions, angles, gains and delays.
     fn contact_priors(&self) -> ContactPriors {
         ContactPriors::default()
+    }
+
+    /// Whether a sensor is fixed to this response point; otherwise the vibrometer visits it.
+    fn is_fixed(&self, _point: &str) -> bool {
+        false
     }
 
     /// Standard deviation of this response point's position along each axis, m; `None` if the

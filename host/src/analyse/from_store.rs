@@ -353,6 +353,13 @@ impl CampaignFile {
         hit.of_row = record.cell != cell.id;
         hit.response.resize_with(responses.len(), Vec::new);
         hit.response_delay_s = responses.iter().map(|place| late(*place)).collect();
+        let only_force = contact && at_contact.is_none() && !cells.is_empty();
+        hit.load_cells = only_force.then(|| {
+            let mut signal = hit.load_cells.take().unwrap_or_default();
+            signal.tangential_n.clear();
+            signal.delay_s = late(cells[0].0);
+            signal
+        });
         hit.contact = at_contact.map(|(a, b)| {
             let mut signals = hit.contact.take().unwrap_or_default();
             signals.tangential_n.clear();
@@ -364,7 +371,10 @@ impl CampaignFile {
         // unpack only the channels that are needed
         let mut wanted: Vec<usize> = std::iter::once(force).chain(responses.iter().copied()).collect();
         if let Some((a, b)) = at_contact {
-            wanted.extend([a, b].into_iter().chain(cells.iter().map(|(place, _)| *place)));
+            wanted.extend([a, b]);
+        }
+        if at_contact.is_some() || only_force {
+            wanted.extend(cells.iter().map(|(place, _)| *place));
         }
         let mut seen = HashSet::new();
         wanted.retain(|place| seen.insert(*place));
@@ -379,17 +389,23 @@ impl CampaignFile {
             for (signal, _) in hit.response.iter_mut().zip(&responses).filter(|(_, own)| **own == place) {
                 write(signal);
             }
-            let (Some((a, b)), Some(signals)) = (at_contact, &mut hit.contact) else { return };
-            if place == a {
-                write(&mut signals.specimen_a_m_per_s);
-            }
-            if place == b {
-                write(&mut signals.specimen_b_m_per_s);
-            }
+            let tangential_n = match (at_contact, &mut hit.contact, &mut hit.load_cells) {
+                (Some((a, b)), Some(signals), _) => {
+                    if place == a {
+                        write(&mut signals.specimen_a_m_per_s);
+                    }
+                    if place == b {
+                        write(&mut signals.specimen_b_m_per_s);
+                    }
+                    &mut signals.tangential_n
+                }
+                (None, _, Some(signal)) => &mut signal.tangential_n,
+                _ => return,
+            };
             for (_, part) in cells.iter().filter(|(own, _)| *own == place) {
-                signals.tangential_n.resize(samples.len(), 0.0);
+                tangential_n.resize(samples.len(), 0.0);
                 let units = map.units(place, samples.of()).unwrap_or(0.0);
-                samples.put(&mut signals.tangential_n, |sum, sample| *sum += part * (sample * units));
+                samples.put(tangential_n, |sum, sample| *sum += part * (sample * units));
             }
         })?;
         Ok(rate)
@@ -461,6 +477,10 @@ impl Measurements for CampaignFile {
     fn point_sigma_m(&self, point: &str) -> Option<f64> {
         let mut points = self.plan.geometry.response.iter().map(toml::Spanned::get_ref);
         points.find(|own| own.name == point)?.sigma_m
+    }
+
+    fn is_fixed(&self, point: &str) -> bool {
+        self.plan.own_channels(point).is_some()
     }
 
     fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {

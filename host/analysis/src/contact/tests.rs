@@ -170,6 +170,9 @@ fn of(cell: &Cell) -> ContactCell<'_> {
         point_sigma_m: None,
         point_grouping: if cell.on_specimen { Grouping::SpecimenA } else { Grouping::InterfaceB },
         spectra: &cell.spectra,
+        axes: Axes::XYZ,
+        fixed: false,
+        records: &[],
         quantity: MotionQuantity::Velocity,
     }
 }
@@ -184,7 +187,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
     Input {
         cells: cells.iter().map(of).collect(),
         contact_m: [0.0; 3],
-        spots_m: SPOTS,
+        spots_m: Some(SPOTS),
         priors,
         band_hz: BAND,
     }

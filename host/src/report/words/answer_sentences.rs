@@ -44,6 +44,7 @@ fn of_cause(cause: Cause) -> &'static str {
         Cause::HammerTilt => "the hammer's tilt",
         Cause::Gains => "gains",
         Cause::Skew => "delays between channels",
+        Cause::SensorAxes => "the directions of the fixed sensors' axes",
         Cause::Misfit => "signals that the model does not explain",
     }
 }
