@@ -28,13 +28,7 @@ pub struct Drawn {
 impl Default for Drawn {
     /// Contacts up to 300 N/µm that stick, with the default errors.
     fn default() -> Self {
-        Drawn {
-            stiffest_n_per_m: 300e6,
-            errors: 1.0,
-            gain: 0.005,
-            slip_limit_n: None,
-            accelerometers: false,
-        }
+        Drawn { stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005, slip_limit_n: None, accelerometers: false }
     }
 }
 

@@ -19,8 +19,8 @@ use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
-use sensors::{Direct, FixedSensors};
 use sensors::Sensors;
+use sensors::{Direct, FixedSensors};
 use stepper::{ScanForces, Slipping, Span, Stepper};
 
 pub use channels::{CHANNELS, Channel, Measured};

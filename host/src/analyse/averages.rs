@@ -197,8 +197,7 @@ impl CellSums {
         let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
         let force_spectrum = force.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
         let kept = all.band(self.lines_hz[0], self.lines_hz[1]);
-        let contact =
-            (self.asked.contact && spots).then(|| kept.of_outputs(self.axes..self.axes + 3));
+        let contact = (self.asked.contact && spots).then(|| kept.of_outputs(self.axes..self.axes + 3));
         Ok(CellAverage {
             spectra: kept.of_outputs(0..self.axes),
             name: self.name,

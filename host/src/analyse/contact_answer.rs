@@ -79,10 +79,7 @@ pub fn cells<'a, M: Measurements>(
 }
 
 /// Input of the contact identification.
-pub fn input<'a, M: Measurements>(
-    measurements: &M,
-    cells: Vec<ContactCell<'a>>,
-) -> Input<'a> {
+pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>) -> Input<'a> {
     Input {
         cells,
         contact_m: measurements.geometry().virtual_point_b_m,

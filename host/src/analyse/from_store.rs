@@ -5,11 +5,13 @@
 use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
-use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, Progress, ShakerLevel, Wanted};
+use super::cell::{
+    CellName, ContactDelays, Hit, KnownContact, Measurements, Progress, SensorMass, ShakerLevel, Wanted,
+};
 use super::chosen::DataQuality;
 use super::findings::Findings;
 use super::plan_geometry::{geometry, places};
-use crate::campaign::plan::{Plan, structure};
+use crate::campaign::plan::{Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
@@ -28,7 +30,7 @@ use crate::results::{Calibrated, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::Frf;
-use crate::substructuring::geometry::Geometry;
+use crate::substructuring::geometry::{Geometry, Grouping};
 use jointrig_protocol::channel::{Quantity, Role};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -481,6 +483,18 @@ impl Measurements for CampaignFile {
 
     fn is_fixed(&self, point: &str) -> bool {
         self.plan.own_channels(point).is_some()
+    }
+
+    fn sensor_masses(&self) -> Vec<SensorMass> {
+        let points = self.plan.geometry.response.iter().map(toml::Spanned::get_ref);
+        let own = |point: &ResponsePoint| {
+            Some(SensorMass {
+                point: point.name.clone(),
+                grouping: Grouping::try_from(point.grouping).ok()?,
+                mass_kg: 1e-3 * point.mass_g?,
+            })
+        };
+        points.filter_map(own).collect()
     }
 
     fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {

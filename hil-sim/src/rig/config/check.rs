@@ -302,7 +302,10 @@ pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
             return Err(bad("sensors.left_out", "the hammer's force is needed"));
         }
         if !taken.contains(name) || left_out[..index].contains(name) {
-            return Err(bad("sensors.left_out", &format!("`{name}` is not one of the ten channels, or is listed twice")));
+            return Err(bad(
+                "sensors.left_out",
+                &format!("`{name}` is not one of the ten channels, or is listed twice"),
+            ));
         }
     }
     let most = MAX_CHANNELS - (CHANNELS - left_out.len());

@@ -566,17 +566,14 @@ pub(super) fn cell_values(
     let axes = cell.axes.directions().len();
     let outputs: Vec<Option<usize>> = match spectra.outputs() {
         n if n == axes + 1 => [Some(axes), None, None].into_iter().chain((0..axes).map(Some)).collect(),
-        n if n == axes + 3 => {
-            [axes + 2, axes + 1, axes].into_iter().chain(0..axes).map(Some).collect()
-        }
+        n if n == axes + 3 => [axes + 2, axes + 1, axes].into_iter().chain(0..axes).map(Some).collect(),
         _ => Vec::new(),
     };
     if outputs.is_empty() || chosen.iter().any(|l| *l >= spectra.lines()) {
         return Err(ContactError::Unlike { impact: cell.impact.into(), point: cell.point.into() });
     }
     let response = cell.quantity.order_of_s();
-    let order: Vec<i32> =
-        [0, 1, 1].into_iter().chain(std::iter::repeat_n(response, axes)).collect();
+    let order: Vec<i32> = [0, 1, 1].into_iter().chain(std::iter::repeat_n(response, axes)).collect();
     let inside: Vec<usize> =
         (0..spectra.lines()).filter(|l| band_hz.contains(spectra.frequency_hz()[*l])).collect();
     let hits = spectra.hits() as f64;

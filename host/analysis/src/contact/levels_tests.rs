@@ -156,9 +156,9 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
             point_grouping: if on_arm { Grouping::InterfaceB } else { Grouping::SpecimenA },
             spectra: &own.spectra,
             axes: Axes::XYZ,
-        fixed: false,
-        records: &[],
-        quantity: MotionQuantity::Velocity,
+            fixed: false,
+            records: &[],
+            quantity: MotionQuantity::Velocity,
         }
     });
     Input { cells: cells.collect(), contact_m: [0.0; 3], spots_m: Some(SPOTS), priors, band_hz: BAND }

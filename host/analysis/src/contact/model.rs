@@ -280,7 +280,8 @@ impl<'a> LineModel<'a> {
                     }
                     if let Some((at, across)) = &axis.across {
                         for (k, across) in across.iter().enumerate() {
-                            let along: C = across.iter().zip(&moved).map(|(part, of)| part * dot(of, x)).sum();
+                            let along: C =
+                                across.iter().zip(&moved).map(|(part, of)| part * dot(of, x)).sum();
                             own.push((local(at + k), factor * along));
                         }
                     }

@@ -397,9 +397,9 @@ impl Plan {
     /// rigid body.
     fn known(&self, block: &ConfigurationPlan, grouping: u8) -> bool {
         let points = block.responses.iter().filter_map(|name| self.response(name.get_ref()));
-        let sensors = points.filter(|point| point.grouping == grouping).flat_map(|point| {
-            point.axes().into_iter().map(|(_, direction)| (point.position_m, direction))
-        });
+        let sensors = points
+            .filter(|point| point.grouping == grouping)
+            .flat_map(|point| point.axes().into_iter().map(|(_, direction)| (point.position_m, direction)));
         determines_motion(&sensors.collect::<Vec<_>>())
     }
 
