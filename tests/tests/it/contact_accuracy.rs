@@ -266,9 +266,8 @@ fn accelerometers_in_place_of_lasers() {
     let widths: Vec<f64> = found.iter().map(|(_, rows)| median_half_width(rows)).collect();
     println!("median half widths: {widths:?}");
     let missed = found[0].1.iter().filter(|row| !row.stiffness.covers()).count();
-    let none = found[0].1.iter().filter(|row| row.stiffness.found.is_none()).count();
     // of 20 intervals of 95 % three or fewer miss with a probability of 98 %
-    assert!(missed <= 3 && none == 0, "{:?}", found[0].1);
+    assert!(missed <= 3, "{:?}", found[0].1);
 }
 
 #[test]

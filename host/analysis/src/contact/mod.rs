@@ -34,6 +34,8 @@ use std::f64::consts::TAU;
 
 mod block;
 mod driven;
+#[cfg(test)]
+mod fixed_tests;
 mod levels;
 #[cfg(test)]
 mod levels_tests;
