@@ -20,6 +20,8 @@ mod chosen;
 mod configuration_stage;
 mod contact_answer;
 mod contact_stage;
+#[cfg(feature = "sim")]
+pub mod expected;
 mod findings;
 mod from_frfs;
 mod from_store;

@@ -161,11 +161,9 @@ struct Impact<'a> {
 pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Block>, ContactError> {
     let impacts = impacts(input);
     let chosen = chosen_lines(input)?;
-    let mut points: BTreeMap<(Group, &str), usize> = BTreeMap::new();
-    let mut sensors: BTreeMap<(Group, &str), Vec<Axis>> = BTreeMap::new();
+    let mut points: BTreeMap<(Group, &str), MeasuredPoint> = BTreeMap::new();
     for impact in &impacts {
         for (group, cell) in &impact.cells {
-            sensors.entry((*group, cell.point)).or_insert_with(|| axes(cell, &input.priors, parameters));
             points.entry((*group, cell.point)).or_insert_with(|| {
                 let (sigma, cause) = match group {
                     Group::ArmB => (input.priors.positions.position_m, Cause::ArmPoints),
@@ -173,15 +171,17 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
                 };
                 let sigma = cell.point_sigma_m.unwrap_or(sigma);
                 let at = relative(cell.point_m, input.contact_m);
-                parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
+                let axes = axes(cell, &input.priors, parameters);
+                let position = parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
                     Parameter::new(format!("{axis} of point {}", cell.point), start, sigma, cause)
-                }))
+                }));
+                MeasuredPoint { position, axes }
             });
         }
     }
     let mut all = Vec::new();
     for impact in &impacts {
-        all.push(block(impact, &impacts, (&points, &sensors), input, &chosen, parameters)?);
+        all.push(block(impact, &impacts, &points, input, &chosen, parameters)?);
     }
     // a shift of one impact is formed from the motion of other impacts, line by line
     let everywhere: Vec<Vec<f64>> =
@@ -200,6 +200,15 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
         }
     }
     Ok(all)
+}
+
+/// A point, which several impacts may measure.
+#[derive(Debug, Clone)]
+struct MeasuredPoint {
+    /// Index of its first coordinate among the parameters.
+    position: usize,
+    /// The axes of its sensor.
+    axes: Vec<Axis>,
 }
 
 /// The axes of a cell's sensor, with the parameters of a fixed one.
@@ -324,7 +333,7 @@ const LINE_DISTANCE: f64 = 0.4;
 fn block(
     impact: &Impact<'_>,
     impacts: &[Impact<'_>],
-    (points, sensors): (&BTreeMap<(Group, &str), usize>, &BTreeMap<(Group, &str), Vec<Axis>>),
+    points: &BTreeMap<(Group, &str), MeasuredPoint>,
     input: &Input<'_>,
     chosen: &[usize],
     parameters: &mut Parameters,
@@ -341,9 +350,8 @@ fn block(
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<CellValues>::new());
     for (place, (group, cell)) in impact.cells.iter().enumerate() {
-        let point = points[&(*group, cell.point)];
+        let MeasuredPoint { position: point, axes } = points[&(*group, cell.point)].clone();
         own.extend(point..point + 3);
-        let axes = sensors[&(*group, cell.point)].clone();
         own.extend(axes.iter().flat_map(|axis| [axis.gain, axis.delay]));
         own.extend(axes.iter().filter_map(|axis| axis.across).flat_map(|(at, _)| at..at + 2));
         // the first cell with the same hits
