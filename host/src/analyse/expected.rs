@@ -215,17 +215,16 @@ impl Simulation<'_> {
                 (true, _) => (2, TRIAXIAL_FLOOR),
             };
             // v_A, v_B and T are those of the hits, which all fixed sensors share
-            let (hits, at_contact) = match shared.clone().filter(|_| fixed) {
-                Some(set) => set,
-                None => {
-                    self.sets += 1;
-                    let mut signals = Vec::new();
-                    for spot in of_spots.iter().flatten() {
-                        signals.push(self.noisy(spot, rig.sensors.ldv_a.floor));
-                    }
-                    signals.push(self.noisy(&force, t_floor));
-                    (self.sets, signals)
+            let (hits, at_contact) = if let Some(set) = shared.clone().filter(|_| fixed) {
+                set
+            } else {
+                self.sets += 1;
+                let mut signals = Vec::new();
+                for spot in of_spots.iter().flatten() {
+                    signals.push(self.noisy(spot, rig.sensors.ldv_a.floor));
                 }
+                signals.push(self.noisy(&force, t_floor));
+                (self.sets, signals)
             };
             if fixed {
                 shared = Some((hits, at_contact.clone()));
@@ -256,7 +255,11 @@ impl Simulation<'_> {
     fn noisy(&mut self, exact: &[Complex<f64>], floor: f64) -> Hits {
         // E|N|² of a windowed transform is floor²/2 · ∫ e^(−2σt) dt; half of it is in each part
         let sigma = floor / (8.0 * SIGMA_PER_S).sqrt();
-        let mut part = || -> f64 { sigma * StandardNormal.sample(&mut self.random) };
+        let random = &mut self.random;
+        let mut part = || {
+            let normal: f64 = StandardNormal.sample(random);
+            sigma * normal
+        };
         let wanted = self.plan.hits.get_ref().wanted;
         let mut hit = |x: &Complex<f64>| x + Complex::new(part(), part());
         exact.iter().map(|x| (0..wanted).map(|_| hit(x)).collect()).collect()

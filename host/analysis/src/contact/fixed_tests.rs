@@ -92,8 +92,8 @@ fn measured(noise: f64, t_noise: f64, seed: u64) -> Vec<Cell> {
                     let spectra =
                         CrossSpectra::new(1.0, frequency_hz.clone(), SIGMA_PER_S, HITS, s_ff, outputs)
                             .expect("alike");
-                    let first = 100 * (impact as i64) + if structure == Structure::B { 0 } else { 1000 };
-                    let records = std::array::from_fn(|hit| first + hit as i64);
+                    let first = 100 * impact + if structure == Structure::B { 0 } else { 1000 };
+                    let records = [0, 1, 2, 3].map(|hit| i64::try_from(first + hit).expect("small"));
                     cells.push(Cell { structure, impact, sensor, on_a, records, spectra });
                 }
             }

@@ -67,30 +67,28 @@ fn interface_modes(found: &Cmif) -> Check {
 
 /// What the masses of fixed sensors change.
 fn sensor_masses(found: &SensorMasses) -> Check {
-    let mut meaning = format!(
+    let sums = format!(
         "The fixed sensors add {} g to A's side and {} g to B's: the structure that was measured includes them. k_T does not depend on those on A, \
          because the force at the contact is known from B's side.",
         short(1e3 * found.on_a_kg),
         short(1e3 * found.on_b_kg)
     );
-    if found.in_one.is_empty() {
-        meaning.push_str(
-            " Those on B were measured on B alone and in the assembly: arm B has their inertia in both, and k_T does not depend on them either.",
-        );
-    } else {
-        let names = found.in_one.join(", ");
-        meaning.push_str(&match found.change {
-            Some(change) => format!(
-                " {names} on B was measured on B alone or in the assembly, but not in both: if it was mounted only there, the force at the contact is up \
-                 to {} % off, and k_T as much. Leave the sensors on B in place for both.",
-                short(100.0 * change)
-            ),
-            None => format!(
-                " {names} on B was measured on B alone or in the assembly, but not in both: what that changes is not known. Leave the sensors on B in \
-                 place for both."
-            ),
-        });
-    }
+    let names = found.in_one.join(", ");
+    let on_b = match found.change {
+        _ if found.in_one.is_empty() => {
+            "Those on B were measured on B alone and in the assembly: arm B has their inertia in both, and k_T does not depend on them either.".to_owned()
+        }
+        Some(change) => format!(
+            "{names} on B was measured on B alone or in the assembly, but not in both: if it was mounted only there, the force at the contact is up to \
+             {} % off, and k_T as much. Leave the sensors on B in place for both.",
+            short(100.0 * change)
+        ),
+        None => format!(
+            "{names} on B was measured on B alone or in the assembly, but not in both: what that changes is not known. Leave the sensors on B in place \
+             for both."
+        ),
+    };
+    let meaning = format!("{sums} {on_b}");
     let check = Check::new(SENSOR_MASSES, found.ok(), meaning)
         .with("on_a_kg", found.on_a_kg)
         .with("on_b_kg", found.on_b_kg);
