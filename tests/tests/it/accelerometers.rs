@@ -37,6 +37,18 @@ fn the_contacts_stiffness_is_found_with_accelerometers_and_a_hammer_by_hand() {
     println!("{said}\n{contact}");
     // positions to 0.2 mm leave some per cent
     assert!(low < TRUTH && TRUTH < high && high < 1.3 * low, "{contact}");
+    // the masses are told, and change nothing: all sensors on B stay
+    let checks = results["checks"].as_array().unwrap();
+    let masses = checks.iter().find(|check| check["name"] == "sensor-masses").unwrap();
+    assert_eq!(masses["ok"], true, "{masses}");
+    assert!(masses["meaning"].as_str().unwrap().contains("2.8 g to A's side and 2.8 g to B's"), "{masses}");
+    // what the plan let expect is what came out
+    let line = told.lines().find(|line| line.contains("a contact of 180 N/µm: ± ")).unwrap();
+    let (_, rest) = line.split_once("± ").unwrap();
+    let expected = rest.split_once(" %").unwrap().0.parse::<f64>().unwrap();
+    let half = 50.0 * (high - low) / contact["k_t_n_per_m"]["mean"].as_f64().unwrap();
+    // another draw of noise and errors; the interval itself scatters by a tenth
+    assert!((half / expected - 1.0).abs() < 0.3, "{half} and {expected}");
 }
 
 #[test]
