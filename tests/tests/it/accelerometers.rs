@@ -41,7 +41,7 @@ fn the_contacts_stiffness_is_found_with_accelerometers_and_a_hammer_by_hand() {
     let checks = results["checks"].as_array().unwrap();
     let masses = checks.iter().find(|check| check["name"] == "sensor-masses").unwrap();
     assert_eq!(masses["ok"], true, "{masses}");
-    assert!(masses["meaning"].as_str().unwrap().contains("2.8 g to A's side and 2.8 g to B's"), "{masses}");
+    assert!(masses["meaning"].as_str().unwrap().contains("2.80 g to A's side and 2.80 g to B's"), "{masses}");
     // what the plan let expect is what came out
     let line = told.lines().find(|line| line.contains("a contact of 180 N/µm: ± ")).unwrap();
     let (_, rest) = line.split_once("± ").unwrap();

@@ -47,7 +47,7 @@ impl SensorMasses {
             averages.iter().any(|c| c.name.configuration == structure && c.name.response == own.point)
         };
         let in_one = |own: &&SensorMass| seen(own, Structure::B) != seen(own, Structure::Ajb);
-        let sum = |all: &mut dyn Iterator<Item = &SensorMass>| all.map(|own| own.mass_kg).sum::<f64>();
+        let sum = |all: &mut dyn Iterator<Item = &SensorMass>| all.fold(0.0, |sum, own| sum + own.mass_kg);
         let off_kg = sum(&mut masses.iter().filter(on_b).filter(in_one));
         Some(SensorMasses {
             on_a_kg: sum(&mut masses.iter().filter(|own| !on_b(own))),
