@@ -6,7 +6,6 @@
 use super::sync::{PERIOD, SyncPort, Wires};
 use crate::link::DeviceEnd;
 use crate::rig;
-use crate::rig::channels::{EXCITATION, FORCE};
 use crate::rig::config::Cable;
 use crate::rig::{Configuration, JointState, Measured, Rig, RigError, config};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -161,6 +160,7 @@ pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
         quantity: match channel.quantity {
             Measured::Force => Quantity::Force,
             Measured::Velocity => Quantity::Velocity,
+            Measured::Acceleration => Quantity::Acceleration,
         },
         units_per_volt: (channel.units_per_volt * f64::from(channel.polarity)) as f32,
         range_v: channel.range_v as f32,
@@ -346,10 +346,10 @@ impl VirtualInputs {
         let around = &rig.config().surroundings;
         let seconds = seen.scans as f64 / f64::from(rig.scan_rate_hz());
         let changed = *self.controls.cables.lock().unwrap_or_else(PoisonError::into_inner);
-        let cables = [(FORCE, around.force_cable), (EXCITATION, around.excitation_cable)];
-        let supplies = cables.into_iter().zip(changed).map(|((place, cable), changed)| Supply {
-            channel: place as u8,
-            bias_v: changed.unwrap_or(cable).bias_v(),
+        let cables = [("force", around.force_cable), ("excitation", around.excitation_cable)];
+        let supplies = cables.into_iter().zip(changed).filter_map(|((name, cable), changed)| {
+            let channel = rig.channels().iter().position(|channel| channel.name == name)? as u8;
+            Some(Supply { channel, bias_v: changed.unwrap_or(cable).bias_v() })
         });
         Slow {
             temperature_c: Some((around.temperature_c + around.warming_k_per_s * seconds) as f32),

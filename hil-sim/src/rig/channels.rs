@@ -2,7 +2,7 @@
 
 use super::config;
 
-/// Number of channels of the rig, without additional fixed vibrometers.
+/// Number of channels of the rig, without additional fixed sensors.
 pub const CHANNELS: usize = 10;
 /// Index of the hammer's force.
 pub const FORCE: usize = 0;
@@ -29,16 +29,29 @@ pub enum Measured {
     Force,
     /// Velocity (m/s).
     Velocity,
+    /// Acceleration (m/s²).
+    Acceleration,
+}
+
+impl Measured {
+    /// Its SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s²",
+        }
+    }
 }
 
 /// One channel of the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// Its name: `force`, `vib_x` … `excitation`, or the rig's name of a fixed vibrometer.
+    /// Its name: `force`, `vib_x` … `excitation`, or the rig's name of a fixed sensor.
     pub name: String,
     /// What it measures.
     pub quantity: Measured,
-    /// `N` or `m/s`.
+    /// `N`, `m/s` or `m/s²`.
     pub unit: &'static str,
     /// Units per volt.
     pub units_per_volt: f64,
@@ -67,7 +80,7 @@ pub fn channels(sensors: &config::Sensors) -> [Channel; CHANNELS] {
     let channel = |name: &str, quantity, units_per_volt, delay_s, polarity, axis| Channel {
         name: name.to_owned(),
         quantity,
-        unit: if quantity == Measured::Force { "N" } else { "m/s" },
+        unit: quantity.unit(),
         units_per_volt,
         range_v: sensors.range_v,
         bits: sensors.bits,

@@ -8,17 +8,21 @@
 //! the true positions of the spots, are keyed to (seed, purpose): the same in every cell and
 //! configuration, whatever was visited before.
 //!
-//! Fixed vibrometers stay at one point while the hammer moves; each has its own channel after the
-//! ten. Their errors are of the same kinds as those of the other vibrometers: true position (keyed
-//! to the response point as for the 3-D vibrometer, but without the aiming error), gain, skew and
-//! noise. Their noise has a separate stream, so that they do not change the ten channels.
+//! Fixed sensors (vibrometers, accelerometers) stay at one point while the hammer moves; each has
+//! its own channel after the ten. Their errors are of the same kinds as those of the vibrometers:
+//! true position (keyed to the response point as for the 3-D vibrometer, but without the aiming
+//! error), gain, skew and noise, and a sensitivity to motion across their direction. Their noise has
+//! a separate stream, so that they do not change the ten channels.
+//!
+//! An accelerometer's signal is c (A x + b f), with the row c of its velocity: it contains the
+//! forces of the same moment directly.
 
 use super::channels::{CHANNELS, Channel, FORCE, LOAD_CELLS, Measured, VIBROMETER, is_gauged};
-use super::config::{FixedVibrometer, Hammer, RigConfig, Spot, Spots};
+use super::config::{FixedQuantity, FixedSensor, Hammer, RigConfig, Spot, Spots};
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
 use super::key::{Stream, normal, stream, uniform};
-use super::probe::{Probe, shifted};
+use super::probe::{Probe, across, shifted};
 use super::{config, normalized};
 use jointrig_protocol::channel::{NARROW_BITS, split_code};
 use nalgebra::DVector;
@@ -36,6 +40,8 @@ pub struct Sensors {
     delays: Vec<(usize, DelayLine)>,
     cross_talk: Option<[[f64; 3]; 3]>,
     cell: ForceCell,
+    /// Whether the first load cell's channel is the sum of all three.
+    summed: bool,
     speckle: Option<Speckle>,
     stream: Stream,
 }
@@ -86,6 +92,7 @@ impl Sensors {
             cross_talk: Some(flaws.cross_talk)
                 .filter(|parts| parts.as_flattened().iter().any(|part| *part != 0.0)),
             cell: ForceCell::new(&sensors.force, &config.hammer, 1.0 / rate_hz),
+            summed: sensors.load_cells.summed,
             speckle: speckle.map(|stream| Speckle::new(&sensors.vibrometer.speckle, rate_hz, stream)),
             stream,
         }
@@ -115,6 +122,9 @@ impl Sensors {
             for (at, parts) in LOAD_CELLS.into_iter().zip(parts) {
                 signals[at] += parts.iter().zip(own).map(|(part, force_n)| part * force_n).sum::<f64>();
             }
+        }
+        if self.summed {
+            signals[LOAD_CELLS[0]] = LOAD_CELLS.iter().map(|at| signals[*at]).sum();
         }
         for (at, line) in &mut self.delays {
             signals[*at] = line.pass(signals[*at]);
@@ -285,7 +295,7 @@ pub(super) fn code(exact: f64) -> i16 {
     (within + ONES_PLACE).to_bits() as i16
 }
 
-/// Errors of one fixed vibrometer.
+/// Errors of one fixed sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedFlaw {
     /// Its true position and direction.
@@ -300,7 +310,7 @@ pub struct FixedFlaw {
 /// verified that the points exist.
 fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
     let errors = config.errors.acting();
-    let one = |own: &FixedVibrometer| {
+    let one = |own: &FixedSensor| {
         let point = config.responses.iter().find(|point| point.name == own.response)?;
         let sigma_m = if point.body.is_specimen() { errors.specimen_point_m } else { errors.position_m };
         let sigma_m = point.sigma_m.filter(|_| !errors.none).unwrap_or(sigma_m);
@@ -311,7 +321,7 @@ fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
             probe: Probe {
                 body: point.body,
                 position_m: shifted(point.position_m, sigma_m, &mut place),
-                direction: normalized(own.direction),
+                direction: sensitive(own, errors.transverse, seed),
             },
             gain: stated * (1.0 + errors.gain * draw("gain")),
             skew_s: errors.skew_s * draw("skew"),
@@ -320,12 +330,30 @@ fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
     config.sensors.fixed.iter().filter_map(one).collect()
 }
 
+/// The direction of a fixed sensor with its drawn sensitivities across it: its reading is the motion
+/// along this vector, whose length is not one.
+fn sensitive(own: &FixedSensor, transverse: f64, seed: u64) -> [f64; 3] {
+    let direction = normalized(own.direction);
+    if transverse == 0.0 {
+        return direction;
+    }
+    let mut stream = stream(seed, &["transverse", &own.name]);
+    across(direction).into_iter().fold(direction, |sum, across| {
+        let part = transverse * normal(&mut stream);
+        std::array::from_fn(|axis| sum[axis] + part * across[axis])
+    })
+}
+
 /// Their channels, in the order of the configuration.
 pub(super) fn fixed_channels(config: &RigConfig) -> Vec<Channel> {
-    let one = |own: &FixedVibrometer| Channel {
+    let quantity = |own: &FixedSensor| match own.quantity {
+        FixedQuantity::Velocity => Measured::Velocity,
+        FixedQuantity::Acceleration => Measured::Acceleration,
+    };
+    let one = |own: &FixedSensor| Channel {
         name: own.name.clone(),
-        quantity: Measured::Velocity,
-        unit: "m/s",
+        quantity: quantity(own),
+        unit: quantity(own).unit(),
         units_per_volt: own.units_per_volt,
         range_v: config.sensors.range_v,
         bits: config.sensors.bits,
@@ -341,8 +369,18 @@ pub(super) fn fixed_channels(config: &RigConfig) -> Vec<Channel> {
 pub struct FixedRows {
     /// Row of each; zero where the configuration lacks the body.
     pub rows: Vec<DVector<f64>>,
-    /// Size of one converter step of each (m/s).
+    /// Size of one converter step of each, in its own unit.
     pub steps: Vec<f64>,
+}
+
+/// How much an accelerometer reads per newton of the forces of the same moment (m/s² per N): the
+/// hammer's, the shaker's, and that by which a slipping contact differs from its stuck spring. Zero
+/// for a vibrometer.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Direct {
+    pub hammer: f64,
+    pub shaker: f64,
+    pub joint: f64,
 }
 
 /// Converts the true signals to codes.
@@ -366,7 +404,7 @@ impl FixedSensors {
     /// With the cell's idle `stream`; all channels are delayed by `latency_scans`.
     pub(super) fn new(config: &RigConfig, flaws: &[FixedFlaw], latency_scans: u32, stream: Stream) -> Self {
         let rate_hz = f64::from(config.scan_rate_hz);
-        let one = |((own, channel), flaw): ((&FixedVibrometer, Channel), &FixedFlaw)| {
+        let one = |((own, channel), flaw): ((&FixedSensor, Channel), &FixedFlaw)| {
             let late = f64::from(latency_scans) + (own.delay_s + flaw.skew_s) * rate_hz;
             One {
                 codes_per_unit: flaw.gain * f64::from(own.polarity) / channel.step(),

@@ -1,5 +1,6 @@
 //! Integration tests of whole systems across the packages, one program so that it is linked once.
 
+mod accelerometers;
 mod another_structure;
 mod any_structure;
 mod between_arms_accuracy;

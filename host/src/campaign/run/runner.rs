@@ -40,7 +40,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
 use crate::device::stream::Accounts;
 use crate::device::stream::Recording;
-use jointrig_protocol::channel::words_per_scan;
+use jointrig_protocol::channel::{Role, words_per_scan};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -151,7 +151,10 @@ pub fn run(
         forces
             .learn_judged(record.verdict, PulseHit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
-    session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    // a front end with fewer load cells has no matrix for three
+    if channels.places(Role::LoadCell).len() == LOAD_CELLS {
+        session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    }
     let (epoch, _) = session.start(&channels)?;
     let shooter = Shooter::new(session, &plan, epoch)?;
     let simulated = is_simulated_board(&info.board);
@@ -180,6 +183,9 @@ pub fn run(
     let walked = runner.walk();
     runner.end(walked)
 }
+
+/// Number of load cells whose calibration matrix a device holds.
+const LOAD_CELLS: usize = 3;
 
 /// Hits between two readings of the temperature: some minutes, in which a laboratory's temperature
 /// changes negligibly.
