@@ -140,28 +140,21 @@ text_in_json! {
 /// Numbers in JSON, which has none that are infinite or undefined: these are written as text.
 pub(crate) mod number {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-
-    /// A number, or its name.
-    #[derive(Serialize, Deserialize)]
-    #[serde(untagged)]
-    enum Written {
-        Number(f64),
-        Text(String),
-    }
+    use serde_json::Value;
 
     pub(crate) fn serialize<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
-        let written =
-            if value.is_finite() { Written::Number(*value) } else { Written::Text(value.to_string()) };
-        written.serialize(to)
+        if value.is_finite() { value.serialize(to) } else { value.to_string().serialize(to) }
     }
 
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-        match Written::deserialize(from)? {
-            Written::Number(value) => Ok(value),
-            Written::Text(text) => {
-                text.parse().map_err(|_| de::Error::custom(format!("`{text}` is not a number")))
-            }
-        }
+        // whichever way the JSON library holds its numbers
+        let written = Value::deserialize(from)?;
+        let number = match &written {
+            Value::Number(number) => number.as_f64(),
+            Value::String(text) => text.parse().ok(),
+            _ => None,
+        };
+        number.ok_or_else(|| de::Error::custom(format!("`{written}` is not a number")))
     }
 }
 
