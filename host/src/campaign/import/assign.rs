@@ -3,7 +3,7 @@
 
 use std::str::FromStr;
 
-use jointrig_protocol::channel::{Channel, Quantity, Role};
+use jointrig_protocol::channel::{Channel, Quantity};
 
 use super::channel_file::{ChannelFile, FULL_SCALE, FileChannel};
 use super::roles::{role_of, same_name};
@@ -260,7 +260,7 @@ fn described(
     Ok(Some(Kept {
         place: 0,
         channel: Channel {
-            name: name.parse().map_err(|()| format!("the name `{name}` is too long: 24 letters at most"))?,
+            name: name.parse().map_err(|_| format!("the name `{name}` is too long: 24 letters at most"))?,
             role,
             quantity,
             units_per_volt: units_per_volt as f32,
@@ -294,6 +294,7 @@ fn from_plan(name: &str, planned: Option<&SensorPlan>) -> Option<(Quantity, f64,
 mod tests {
     use super::*;
     use crate::campaign::plan::CONTACT;
+    use jointrig_protocol::channel::Role;
 
     fn file(channels: &[(&str, Option<&str>)]) -> ChannelFile {
         let describe = |(name, unit): &(&str, Option<&str>)| FileChannel {
