@@ -8,6 +8,8 @@
 //! channel from its name and the plan.
 
 pub mod as_recorded;
+pub mod assign;
+pub mod channel_file;
 pub mod roles;
 
 use std::collections::HashSet;
