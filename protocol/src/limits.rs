@@ -1,7 +1,14 @@
 //! The sizes and bounds that both ends agree on. Each is part of the schema hash.
 
-/// Most channels in one scan: two simultaneous-sampling converters with eight channels each.
+/// Most channels in one scan of a controller: two simultaneous-sampling converters with eight
+/// channels each.
 pub const MAX_CHANNELS: usize = 16;
+
+/// Most channels in one scan that this build has room for. A front end on a PC (the bridge) has up
+/// to 64 (feature `many-channels`); the controller's memory is sized for [`MAX_CHANNELS`]. Lists
+/// are sent with their length, so that both builds read each other's frames, and the schema hash
+/// is the same.
+pub const CHANNEL_CAPACITY: usize = if cfg!(feature = "many-channels") { 64 } else { MAX_CHANNELS };
 
 /// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits
 /// each.
@@ -71,7 +78,7 @@ pub const LINK_SILENCE_MS: u32 = 1_000;
 /// many.
 #[must_use]
 pub const fn scans_per_block(channels: usize) -> Option<usize> {
-    if channels == 0 || channels > MAX_CHANNELS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }
+    if channels == 0 || channels > CHANNEL_CAPACITY { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }
 }
 
 #[cfg(test)]
@@ -87,6 +94,7 @@ mod tests {
         assert_eq!(scans_per_block(16), Some(15));
         assert_eq!(scans_per_block(10), Some(24));
         assert_eq!(scans_per_block(0), None);
-        assert_eq!(scans_per_block(17), None);
+        assert_eq!(scans_per_block(CHANNEL_CAPACITY), Some(240 / CHANNEL_CAPACITY));
+        assert_eq!(scans_per_block(CHANNEL_CAPACITY + 1), None);
     }
 }

@@ -40,6 +40,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
 use crate::device::stream::Accounts;
 use crate::device::stream::Recording;
+use jointrig_protocol::channel::Role;
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -150,7 +151,11 @@ pub fn run(
         forces
             .learn_judged(record.verdict, PulseHit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
-    session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    // a device adds up the friction force of exactly three load cells; with another number of them
+    // it has nothing to calibrate
+    if channels.places(Role::LoadCell).len() == 3 {
+        session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    }
     let (epoch, _) = session.start(channels.len())?;
     let shooter = Shooter::new(session, &plan, epoch)?;
     let simulated = is_simulated_board(&info.board);
@@ -169,7 +174,7 @@ pub fn run(
         judge,
         shooter,
         forces,
-        clock: ScanClock::new(f64::from(channels.rate_hz), block),
+        clock: ScanClock::new(channels.fs_hz(), block),
         keeper: Keeper::start(store, options.edits.clone(), options.watch.clone()),
         session_id: id,
         tally,
@@ -274,6 +279,9 @@ impl Runner<'_> {
     pub(super) fn mark(&mut self) -> Result<(), RunError> {
         let asked = Instant::now();
         let next_scan = self.session.status()?.next_scan;
+        if let Some(recorder) = self.session.recorder() {
+            self.clock.widen(recorder.longest_block as usize);
+        }
         self.clock.mark(next_scan, asked, Instant::now());
         Ok(())
     }
@@ -334,8 +342,12 @@ impl Runner<'_> {
         still(self.keeper.edges(self.session_id, edges))
     }
 
-    /// Stores the controller's log lines.
+    /// Stores the controller's log lines, and what a person should know about the recorder.
     pub(super) fn keep_log(&mut self) -> Result<(), RunError> {
+        for remark in self.session.remarks() {
+            self.saw(&Seen::Remark(&remark));
+            still(self.keeper.log(remark))?;
+        }
         let lines = self.session.log_lines();
         lines.into_iter().try_for_each(|line| still(self.keeper.log(format!("controller: {line}"))))
     }
