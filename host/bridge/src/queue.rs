@@ -344,7 +344,8 @@ impl QueuedScans {
             return Poll::Pending;
         }
         let (channels, per_block) = (self.queue.channels, self.per_block);
-        let mut state = self.queue.lock();
+        let mut locked = self.queue.lock();
+        let state = &mut *locked;
         let delivered = match state.entries.front_mut() {
             None if state.ended.is_some() => return Poll::Ready(None),
             None => {
@@ -374,7 +375,7 @@ impl QueuedScans {
             }
         };
         let has_room = state.scans < self.queue.most;
-        drop(state);
+        drop(locked);
         if has_room && self.queue.held {
             self.queue.room.notify_one();
         }

@@ -3,6 +3,7 @@
 mod another_structure;
 mod any_structure;
 mod between_arms_accuracy;
+mod bridge;
 mod calibration;
 mod compare;
 mod contact_accuracy;
