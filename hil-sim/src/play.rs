@@ -252,7 +252,8 @@ mod tests {
         let mut wanted = [0; 16];
         for scan in codes[24..24 + 3200].chunks_exact(32) {
             rig.scan(&mut wanted);
-            let got: Vec<i16> = scan.chunks_exact(2).map(|code| i16::from_le_bytes([code[0], code[1]])).collect();
+            let got: Vec<i16> =
+                scan.chunks_exact(2).map(|code| i16::from_le_bytes([code[0], code[1]])).collect();
             assert_eq!(got, wanted);
         }
         let (_, volts) = played(Samples::F32);

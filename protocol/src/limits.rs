@@ -78,7 +78,11 @@ pub const LINK_SILENCE_MS: u32 = 1_000;
 /// many.
 #[must_use]
 pub const fn scans_per_block(channels: usize) -> Option<usize> {
-    if channels == 0 || channels > CHANNEL_CAPACITY { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }
+    if channels == 0 || channels > CHANNEL_CAPACITY {
+        None
+    } else {
+        Some(BLOCK_SAMPLE_BYTES / (2 * channels))
+    }
 }
 
 #[cfg(test)]

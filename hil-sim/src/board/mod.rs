@@ -24,11 +24,11 @@ use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 
 use crate::executor::{Poller, Polling, Woken, jump};
 use crate::link::{DeviceEnd, HostEnd, pair};
-use jointrig_native::tasks::{NativeCore, Parts};
 use crate::rig::{Rig, RigConfig, RigError};
+use jointrig_native::tasks::{NativeCore, Parts};
 use parts::VirtualDrive;
-pub use parts::{Controls, Seen, Virtual};
 pub(crate) use parts::describe;
+pub use parts::{Controls, Seen, Virtual};
 use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage};
 pub use sync::Wires;
 

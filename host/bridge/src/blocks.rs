@@ -157,7 +157,9 @@ mod tests {
     fn blocks_are_read_in_order_to_the_end() {
         let stream = [block(0, false, &[1; 8]), block(7, true, &[]), block(0, false, &[2; 4])].concat();
         let mut blocks = Blocks::new(&stream[..], 4);
-        let mut next = || blocks.next_block().expect("good").map(|block| (block.lost, block.overrun, block.bytes.to_vec()));
+        let mut next = || {
+            blocks.next_block().expect("good").map(|block| (block.lost, block.overrun, block.bytes.to_vec()))
+        };
         assert_eq!(next(), Some((0, false, vec![1; 8])));
         assert_eq!(next(), Some((7, true, vec![])));
         assert_eq!(next(), Some((0, false, vec![2; 4])));

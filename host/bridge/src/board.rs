@@ -22,7 +22,7 @@ use jointrig_protocol::answer::Reset;
 use jointrig_protocol::limits::scans_per_block;
 
 use crate::header::{Header, HeaderError};
-use crate::queue::{QueuedScans, Queue, read_stream};
+use crate::queue::{Queue, QueuedScans, read_stream};
 
 /// Duration of the scans that can be sent again, s. A person who strikes waits for half of it
 /// after "in place".
@@ -59,7 +59,10 @@ impl Bridge {
     ///
     /// # Errors
     /// [`OpenError`]. The thread that reads the source then ends when the source does.
-    pub fn open(source: impl Read + Send + 'static, patience: Duration) -> Result<(Self, HostEnd), OpenError> {
+    pub fn open(
+        source: impl Read + Send + 'static,
+        patience: Duration,
+    ) -> Result<(Self, HostEnd), OpenError> {
         let (host, device) = pair();
         let (sender, opened) = sync_channel(1);
         std::thread::Builder::new().name("bridge reader".into()).spawn({

@@ -235,7 +235,10 @@ mod tests {
         let f32s: Vec<u8> = volts.flat_map(f32::to_le_bytes).collect();
         let (got, remarks) = runs(&header("f32", 10.0), &f32s);
         assert_eq!(got, vec![Ok(all)]);
-        assert!(remarks.iter().all(|remark| !remark.contains("full scale of 10; samples beyond")), "{remarks:?}");
+        assert!(
+            remarks.iter().all(|remark| !remark.contains("full scale of 10; samples beyond")),
+            "{remarks:?}"
+        );
     }
 
     #[test]
@@ -257,7 +260,10 @@ mod tests {
         let (got, remarks) = runs(&header("f64", 5.0), &bytes);
         assert_eq!(got[0].as_ref().map(|codes| codes[..4].to_vec()), Ok(vec![0, 32_767, 0, -32_768]));
         assert_eq!(remarks.len(), 2, "{remarks:?}");
-        assert!(remarks[0].contains("`b`: a sample is 1.500 times its stated full scale of 5"), "{remarks:?}");
+        assert!(
+            remarks[0].contains("`b`: a sample is 1.500 times its stated full scale of 5"),
+            "{remarks:?}"
+        );
         assert!(remarks[1].contains("`a`: its noise is 0.14 codes"), "{remarks:?}");
     }
 }

@@ -127,7 +127,9 @@ pub enum HeaderError {
     #[error("it ended before its header, one line of JSON, was complete")]
     Ended,
     /// The header never ends.
-    #[error("its first line has more than {MOST_BYTES} bytes: it must be one line of JSON, ended by a line feed")]
+    #[error(
+        "its first line has more than {MOST_BYTES} bytes: it must be one line of JSON, ended by a line feed"
+    )]
     TooLong,
     /// It is not JSON, or a field is missing, unknown or of another type.
     #[error("its first line is not a header: {0}; it begins with `{1}`")]
@@ -184,7 +186,11 @@ impl Header {
         let mut line = Vec::new();
         source.by_ref().take(MOST_BYTES).read_until(b'\n', &mut line)?;
         if line.pop_if(|last| *last == b'\n').is_none() {
-            return Err(if line.len() as u64 == MOST_BYTES { HeaderError::TooLong } else { HeaderError::Ended });
+            return Err(if line.len() as u64 == MOST_BYTES {
+                HeaderError::TooLong
+            } else {
+                HeaderError::Ended
+            });
         }
         Self::parse(&line)
     }
@@ -253,7 +259,10 @@ fn channel(own: &ChannelLine, bits: u8) -> Result<Channel, HeaderError> {
     let unit = UNITS.iter().find(|(word, ..)| *word == own.unit);
     let (_, quantity, si) = *unit.ok_or_else(|| {
         let words = UNITS.map(|(word, ..)| word).join(", ");
-        HeaderError::Field(format!("channel `{called}`: unit `{}` is unknown: write one of {words}", own.unit))
+        HeaderError::Field(format!(
+            "channel `{called}`: unit `{}` is unknown: write one of {words}",
+            own.unit
+        ))
     })?;
     let units_per_volt = own.sensitivity_v.map_or(si, |volts| si / volts) as f32;
     refuse(units_per_volt.is_normal(), || {

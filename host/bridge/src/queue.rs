@@ -262,14 +262,7 @@ struct Arrivals {
 
 impl Arrivals {
     fn new(rate_hz: f64) -> Self {
-        Self {
-            rate_hz,
-            begun: Instant::now(),
-            scans: 0,
-            leads: VecDeque::new(),
-            first: None,
-            checked: false,
-        }
+        Self { rate_hz, begun: Instant::now(), scans: 0, leads: VecDeque::new(), first: None, checked: false }
     }
 
     /// Scans that are missing by the clock if a block arrives now with which `scans` more are

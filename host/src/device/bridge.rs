@@ -25,6 +25,9 @@ const END_PATIENCE: Duration = Duration::from_secs(2);
 /// Wait for the exit status and the last lines of a program whose output has ended.
 const STATUS_PATIENCE: Duration = Duration::from_millis(500);
 
+/// Environment variable of the programs that are started here.
+const STARTED_BY_THE_HOST: &str = "JOINTRIG_BRIDGE";
+
 /// Longest line of a program's standard error that is kept, bytes.
 const LONGEST_LINE: u64 = 4096;
 
@@ -63,6 +66,8 @@ struct Program {
 impl Program {
     fn start(command: &str) -> Result<(Self, impl Read + Send + use<>), String> {
         let mut child = command_of(command)?
+            // for programs that behave differently when run alone
+            .env(STARTED_BY_THE_HOST, "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -183,7 +188,9 @@ impl BridgedRecorder {
             Ok((device, link)) => Ok(Self { link, source, device }),
             Err(error) => {
                 let why = match (&error, &mut source) {
-                    (OpenError::Header(_), Source::Program(program)) => format!("{error}; {}", program.epitaph()),
+                    (OpenError::Header(_), Source::Program(program)) => {
+                        format!("{error}; {}", program.epitaph())
+                    }
                     _ => error.to_string(),
                 };
                 Err(open(format!("{why} (the format is described in docs/bridge.md)")))

@@ -6,7 +6,7 @@ use jointrig_protocol::answer::{Answer, Counters, Info, Status};
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::event::{self, Event};
 use jointrig_protocol::hello::Hello;
-use jointrig_protocol::limits::{COIL_PULSE_CAP_US, CHANNEL_CAPACITY};
+use jointrig_protocol::limits::{CHANNEL_CAPACITY, COIL_PULSE_CAP_US};
 use jointrig_protocol::shot::Shot;
 use jointrig_protocol::slow::Slow;
 

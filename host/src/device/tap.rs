@@ -124,8 +124,13 @@ pub fn tap() -> (Tap, View) {
         slot: Mutex::new(Slot { envelope: empty(), fresh: false }),
         looks: OnceLock::new(),
     });
-    let tap =
-        Tap { shared: shared.clone(), making: empty(), finest: 1, open: [NOTHING; CHANNEL_CAPACITY], over: 0 };
+    let tap = Tap {
+        shared: shared.clone(),
+        making: empty(),
+        finest: 1,
+        open: [NOTHING; CHANNEL_CAPACITY],
+        over: 0,
+    };
     (tap, View { shared, own: empty() })
 }
 

@@ -8,7 +8,7 @@ use jointrig::device::samples::ChannelView;
 use jointrig::device::session::Session;
 
 use jointrig_protocol::channel::{Quantity, Role};
-use jointrig_protocol::request::{Fire, Shake, Control};
+use jointrig_protocol::request::{Control, Fire, Shake};
 use std::fmt::Write;
 
 const CHANNELS: usize = 64;

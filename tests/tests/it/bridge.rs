@@ -191,9 +191,11 @@ fn a_program_that_ends_or_prints_is_told_and_the_next_run_resumes() {
     let file = folder.path().join("c.jrig");
     let short = folder.path().join("short");
     // the first two hits
-    let cut = Stream { blocks: whole.blocks[..(4.0 * RATE as f64) as usize / BLOCK].to_vec(), ..whole.clone() };
+    let cut =
+        Stream { blocks: whole.blocks[..(4.0 * RATE as f64) as usize / BLOCK].to_vec(), ..whole.clone() };
     std::fs::write(&short, cut.bytes()).unwrap();
-    let ends = format!("bridge:sh -c 'cat {}; echo driver: device was unplugged >&2; exit 3'", short.display());
+    let ends =
+        format!("bridge:sh -c 'cat {}; echo driver: device was unplugged >&2; exit 3'", short.display());
     let told = attempt(&file, 3, &ends).unwrap_err().to_string();
     assert!(told.contains("its output ended; the program ended (exit status: 3); its last line: driver: device was unplugged"), "{told}");
     let first = records(&file);
@@ -324,4 +326,31 @@ fn host_and_program_killed_in_the_middle_lose_nothing() {
     let store = Store::open_read_only(&file).unwrap();
     assert_eq!(verdicts(&all).iter().filter(|verdict| **verdict == "good").count(), 30);
     assert!(origins(&rows(&store)).len() >= 30);
+}
+
+#[test]
+fn the_example_in_c_is_a_recorder() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("bridge");
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/bridge/bridge.c");
+    let made = std::process::Command::new("cc").args(["-Wall", "-Wextra", "-Werror", "-O2", "-o"]);
+    let made = made.arg(&program).args([source, "-lm"]).output().unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let address = format!("bridge:{}", program.display());
+    let mut session = Session::open(address.parse::<Address>().unwrap().open(0).unwrap(), &address).unwrap();
+    let info = session.info().unwrap();
+    let map = session.channels(&info).unwrap();
+    let names: Vec<&str> = map.channels.iter().map(|channel| channel.name.as_str()).collect();
+    assert_eq!((info.board.as_str(), names), ("example in C", vec!["force", "acc"]));
+    session.start(map.len()).unwrap();
+    session.wait_for(25_600).unwrap();
+    let (samples, gaps) = session.cut(0..25_600).unwrap();
+    assert!(gaps.is_empty());
+    let force_n = map.to_si(0, samples.channel(0));
+    let (at, peak) = force_n.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
+    // the middle of a millisecond after half a second; a code is 6 mN
+    assert_eq!(at, 12_813);
+    assert!((peak - 50.0).abs() < 0.01, "{peak}");
+    let peak = map.to_si(1, samples.channel(1)).into_iter().fold(0.0, f64::max);
+    assert!((peak - 29.3).abs() < 0.2, "30 m/s² after a quarter of a period: {peak}");
 }
