@@ -113,8 +113,8 @@ impl<'a, M: RawMutex> Core<'a, M> {
     /// `slots` is the memory of the ring: at least a second of all channels.
     ///
     /// # Panics
-    /// When there are no channels, more than [`limits::CHANNEL_CAPACITY`], or no slots: a programming error of the board that
-    /// cannot be handled at run time.
+    /// When there are no channels, more than [`limits::CHANNEL_CAPACITY`], or no slots: a
+    /// programming error of the board that cannot be handled at run time.
     pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
         assert!(limits::scans_per_block(facts.channels.len()).is_some(), "too few or too many channels");
         assert!(!slots.is_empty(), "the ring needs memory");

@@ -1,5 +1,5 @@
-//! `jointrig-hil-sim`: serves the virtual board on a pseudo-terminal or a socket, or plays the rig as
-//! a recorder.
+//! `jointrig-hil-sim`: serves the virtual board on a pseudo-terminal or a socket, or plays the rig
+//! as a recorder.
 #![forbid(unsafe_code)]
 
 use std::net::TcpListener;

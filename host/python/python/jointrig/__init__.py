@@ -6,6 +6,7 @@
     found = lab.analyse()                  # found.results: what `jointrig analyse` writes to results.json
 
 All arrays are numpy's, all units SI. Nothing writes into a campaign file, and no device can be opened from here.
+`jointrig.bridge` makes a program a recorder that the command measures with.
 """
 
 from __future__ import annotations
