@@ -178,7 +178,7 @@ fn a_wrong_full_scale_is_told() {
     assert!(told.contains("its output ended"), "no hit is good: {told}");
     let kept = records(&file);
     assert!(!kept.is_empty() && kept.iter().all(|kept| kept.verdict == "overload"), "{:?}", verdicts(&kept));
-    assert!(log(&file).contains("channel `force`: a sample is 2."), "{}", log(&file));
+    assert!(log(&file).contains("channel `force`: a sample is 1."), "{}", log(&file));
 
     let (_, _, log) = measured(&with("5000"));
     assert!(log.contains("channel `force`: its noise is 0.0"), "{log}");
@@ -274,7 +274,7 @@ fn host_and_program_killed_in_the_middle_lose_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("rig.toml"), RIG.replace("every_s = 4.0", "every_s = 1.5")).unwrap();
-    std::fs::write(at("plan.toml"), plan(30)).unwrap();
+    std::fs::write(at("plan.toml"), plan(30).replace("most = 12", "most = 90")).unwrap();
     let file = at("c.jrig");
     let made = jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(at("plan.toml")).output();
     assert!(made.as_ref().unwrap().status.success(), "{made:?}");
@@ -333,8 +333,9 @@ fn the_example_in_c_is_a_recorder() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("bridge");
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/bridge/bridge.c");
-    let made = std::process::Command::new("cc").args(["-Wall", "-Wextra", "-Werror", "-O2", "-o"]);
-    let made = made.arg(&program).args([source, "-lm"]).output().unwrap();
+    let mut compiler = std::process::Command::new("cc");
+    compiler.args(["-Wall", "-Wextra", "-Werror", "-O2", "-o"]).arg(&program).args([source, "-lm"]);
+    let made = compiler.output().unwrap();
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let address = format!("bridge:{}", program.display());
     let mut session = Session::open(address.parse::<Address>().unwrap().open(0).unwrap(), &address).unwrap();
@@ -348,9 +349,10 @@ fn the_example_in_c_is_a_recorder() {
     assert!(gaps.is_empty());
     let force_n = map.to_si(0, samples.channel(0));
     let (at, peak) = force_n.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
-    // the middle of a millisecond after half a second; a code is 6 mN
+    // the middle of a millisecond after half a second lies 0.2 scans earlier, where the force is 15 mN
+    // larger; a code is 6 mN
     assert_eq!(at, 12_813);
-    assert!((peak - 50.0).abs() < 0.01, "{peak}");
+    assert!((peak - 49.985).abs() < 0.01, "{peak}");
     let peak = map.to_si(1, samples.channel(1)).into_iter().fold(0.0, f64::max);
     assert!((peak - 29.3).abs() < 0.2, "30 m/s² after a quarter of a period: {peak}");
 }

@@ -147,7 +147,9 @@ pub fn run(
         None => true,
     });
     let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
-    for record in records.iter().flatten() {
+    // a hammer by hand has no coil, and the longest pulse of its device may be 0
+    let swung_by_coil = records.iter().flatten().filter(|_| plan.by_hand().is_none());
+    for record in swung_by_coil {
         forces
             .learn_judged(record.verdict, PulseHit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
