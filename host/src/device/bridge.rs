@@ -65,7 +65,11 @@ struct Program {
 
 impl Program {
     fn start(command: &str) -> Result<(Self, impl Read + Send + use<>), String> {
-        let mut child = command_of(command)?
+        let mut command = command_of(command)?;
+        // Ctrl-C is for the host, which ends after the current hit and then ends the program
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut child = command
             // for programs that behave differently when run alone
             .env(STARTED_BY_THE_HOST, "1")
             .stdin(Stdio::piped())
@@ -136,8 +140,11 @@ fn command_of(line: &str) -> Result<Command, String> {
 
 #[cfg(windows)]
 fn command_of(line: &str) -> Result<Command, String> {
+    use std::os::windows::process::CommandExt;
+
+    const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
     let mut command = Command::new("cmd");
-    command.args(["/C", line]);
+    command.args(["/C", line]).creation_flags(CREATE_NEW_PROCESS_GROUP);
     Ok(command)
 }
 
