@@ -67,6 +67,8 @@ fn a_socket_carries_the_same_records() {
 #[cfg(unix)]
 fn a_bridge_carries_the_same_records() {
     let cells = by_hand(2, &[("A", &["AZ3"], &["A3"]), ("AJB", &["AZ3"], &["A3", "B3"])]);
+    // the operator strikes every 4 s, whether or not the structure is at rest
+    let cells = cells.replace("quiet_relative = 0.003", "quiet_relative = 0.9");
     let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../hil-sim/rigs/by-hand.toml");
     let over = |address: &str| {
         let folder = tempfile::tempdir().unwrap();
