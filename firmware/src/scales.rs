@@ -15,15 +15,15 @@ use heapless::Vec;
 use jointrig_hot::codes;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::channel::{Channel, Role};
-use jointrig_protocol::limits::{MAX_CHANNELS, SCALE_FACTOR_CAP};
+use jointrig_protocol::limits::{CHANNEL_CAPACITY, SCALE_FACTOR_CAP};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// SI units per code of every channel, sign included.
-pub(crate) type UnitsPerCode = Vec<f32, MAX_CHANNELS>;
+pub(crate) type UnitsPerCode = Vec<f32, CHANNEL_CAPACITY>;
 
 /// The built-in scales.
 pub(crate) fn as_built(channels: &[Channel]) -> UnitsPerCode {
-    channels.iter().take(MAX_CHANNELS).map(Channel::units_per_code_f32).collect()
+    channels.iter().take(CHANNEL_CAPACITY).map(Channel::units_per_code_f32).collect()
 }
 
 /// The scales sent by a host, if they are acceptable.

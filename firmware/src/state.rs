@@ -49,7 +49,7 @@ pub struct Facts<'a> {
     pub build: u64,
     /// Scans per second.
     pub scan_rate_hz: u32,
-    /// The channels of a scan, in order: 1 to 16.
+    /// The channels of a scan, in order: 1 to [`limits::CHANNEL_CAPACITY`].
     pub channels: &'a [Channel],
     /// Longest coil pulse of the board, µs.
     pub coil_cap_us: u32,
@@ -115,11 +115,11 @@ impl<'a, M: RawMutex> Core<'a, M> {
     /// `slots` is the memory of the ring: at least a second of all channels.
     ///
     /// # Panics
-    /// When there are no channels, more than 16, or no slots: a programming error of the board that
-    /// cannot be handled at run time.
+    /// When there are no channels, more than [`limits::CHANNEL_CAPACITY`], or no slots: a
+    /// programming error of the board that cannot be handled at run time.
     pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
         let words = words_per_scan(facts.channels);
-        assert!(limits::scans_per_block(words).is_some(), "a scan has 1 to 16 channels");
+        assert!(limits::scans_per_block(words).is_some(), "too few or too many channels");
         assert!(!slots.is_empty(), "the ring needs memory");
         let state = State {
             safety: Safety::new(facts.channels, facts.scan_rate_hz, facts.coil_cap_us, facts.drive_v),

@@ -1,10 +1,17 @@
 //! The sizes and bounds that both ends agree on. Each is part of the schema hash.
 
-/// Most channels in one scan: two simultaneous-sampling converters with eight channels each.
+/// Most channels in one scan of a controller: two simultaneous-sampling converters with eight
+/// channels each.
 pub const MAX_CHANNELS: usize = 16;
 
+/// Most channels in one scan that this build has room for. A front end on a PC (the bridge) has up
+/// to 64 (feature `many-channels`); the controller's memory is sized for [`MAX_CHANNELS`]. Lists
+/// are sent with their length, so that both builds read each other's frames, and the schema hash
+/// is the same.
+pub const CHANNEL_CAPACITY: usize = if cfg!(feature = "many-channels") { 64 } else { MAX_CHANNELS };
+
 /// Most 16-bit words in one scan: two for each channel if all are wide.
-pub const MAX_WORDS: usize = 2 * MAX_CHANNELS;
+pub const MAX_WORDS: usize = 2 * CHANNEL_CAPACITY;
 
 /// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits
 /// each.
@@ -90,7 +97,7 @@ mod tests {
         assert_eq!(scans_per_block(16), Some(15));
         assert_eq!(scans_per_block(10), Some(24));
         assert_eq!(scans_per_block(0), None);
-        assert_eq!(scans_per_block(MAX_WORDS), Some(7));
+        assert_eq!(scans_per_block(MAX_WORDS), Some(240 / MAX_WORDS));
         assert_eq!(scans_per_block(MAX_WORDS + 1), None);
     }
 }

@@ -142,7 +142,7 @@ impl Controls {
 
 /// The rig's channels as protocol types. They are leaked: a firmware's channel table is constant,
 /// and a program creates only a few boards.
-pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
+pub(crate) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
     let cell_or_other = |channel: &rig::Channel| match channel.name.as_str() {
         "force" => Role::HammerForce,
         "ldv_a" => Role::SpecimenA,

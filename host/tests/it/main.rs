@@ -3,6 +3,7 @@
 mod accuracy;
 mod averaged;
 mod between_arms;
+mod bridge;
 mod cmif;
 mod decoupling_reference;
 mod explained;

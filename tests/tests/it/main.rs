@@ -4,6 +4,7 @@ mod accelerometers;
 mod another_structure;
 mod any_structure;
 mod between_arms_accuracy;
+mod bridge;
 mod calibration;
 mod compare;
 mod contact_accuracy;

@@ -9,6 +9,7 @@
     lab.add_hits("AJB", "AZ1", "S1", fs_hz=51_200, force_n=force, channels={...}, units={...})
 
 All arrays are numpy's, all units SI unless stated. Hits and levels can be added to a campaign file; no device can be opened from here.
+`jointrig.bridge` makes a program a recorder that the command measures with.
 """
 
 from __future__ import annotations
