@@ -17,6 +17,7 @@
 //! controlled to the target force ([`run::pulse`]), each record is judged
 //! ([`verdict::judge`](mod@verdict::judge)) and stored on a separate thread (`run/keeper.rs`).
 
+pub mod cut;
 pub mod import;
 pub mod plan;
 pub mod recheck;
