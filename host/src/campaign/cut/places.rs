@@ -10,7 +10,8 @@
 //! - no hit whose answer is neither the same as that of a group nor clearly different from all;
 //! - no two neighbouring groups that may be one place struck wrongly: together no more hits than one
 //!   place should have, and no pause between them;
-//! - no first group that may be test taps.
+//! - no group of few hits without a pause before and after it, and none that comes first: hits beside
+//!   the point, or test taps.
 //!
 //! Counting hits alone decides nothing: a place may have too few hits, or more than wanted because
 //! some were repeated. A group of few hits is no place (test taps, or a hit beside the point); its
@@ -361,12 +362,10 @@ impl<'f> Fit<'f> {
         pauses
     }
 
-    /// The pause before a hit, s.
+    /// The pause before a hit, s; infinite before the first hit and after the last one.
     fn pause_before(&self, hit: usize) -> f64 {
-        match hit.checked_sub(1) {
-            None => f64::INFINITY,
-            Some(before) => self.hits[hit].at_s - self.hits[before].at_s,
-        }
+        let before = hit.checked_sub(1).and_then(|before| self.hits.get(before));
+        before.zip(self.hits.get(hit)).map_or(f64::INFINITY, |(before, own)| own.at_s - before.at_s)
     }
 
     /// Questions about groups that may be no place of their own.
@@ -393,11 +392,18 @@ impl<'f> Fit<'f> {
                 begin + 1
             ));
         }
-        if let [first, _, ..] = sequence.as_slice() {
-            let group = &self.groups[*first];
-            if !group.named && wanted > 1 && 2 * group.members.len() <= wanted {
+        let is_clear = |pause_s: f64| usual.is_some_and(|usual| pause_s >= CLEAR_PAUSE * usual);
+        for (number, group) in sequence.iter().enumerate() {
+            let group = &self.groups[*group];
+            if group.named || wanted == 1 || 2 * group.members.len() > wanted || sequence.len() == 1 {
+                continue;
+            }
+            // a few hits beside the point have no pause on one side; test taps come first
+            let (first, last) = (group.members[0], group.members[group.members.len() - 1]);
+            let apart = is_clear(self.pause_before(first)) && is_clear(self.pause_before(last + 1));
+            if number == 0 || !apart {
                 doubts.push(format!(
-                    "{}: the first place has {} of {wanted} good hits: a place, or test taps elsewhere",
+                    "{}: {} of {wanted} good hits: a place with missing hits, or test taps or hits beside the point",
                     numbers(&group.members),
                     group.members.len()
                 ));

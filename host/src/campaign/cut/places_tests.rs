@@ -162,23 +162,28 @@ fn session(seed: u64, habits: &Habits) -> Session {
     if person.chance(habits.taps) {
         let elsewhere = if person.chance(0.5) { None } else { Some(0) };
         let at = elsewhere.map_or_else(|| person.answer(), |place| answers[place].clone());
+        let mut hard = 0;
         for _ in 0..person.dice.random_range(1..4) {
-            let good = person.chance(0.3);
+            // as many hard taps as one place has hits are a place, for all that a recording shows
+            let good = person.chance(0.3) && hard + 1 < wanted;
+            hard += u32::from(good);
             person.strike(&at, elsewhere, good);
             person.wait(3.0, 0.3);
         }
         person.wait(16.0, 0.4);
     }
     let last = if person.chance(habits.stopped) { person.dice.random_range(1..=places) } else { places };
+    let mut visited = Vec::new();
     for place in 0..last {
         if person.chance(habits.skipped) {
             continue;
         }
         person.visit(&answers[place], place, wanted, habits);
+        visited.push(place);
         if place > 1 && person.chance(habits.again) {
             let earlier = person.dice.random_range(0..place);
-            // a place that was never struck is not struck again
-            if person.session.truth.contains(&Some(earlier)) {
+            // a place that was skipped is not struck later: nothing but its name could tell
+            if visited.contains(&earlier) {
                 person.visit(&answers[earlier], earlier, wanted, habits);
             }
         }
@@ -210,7 +215,7 @@ fn drawn(first: u64, habits: &Habits) -> ([usize; 4], Vec<String>) {
                         None => counts[2] += usize::from(true_place.is_some()),
                         Some(place) if Some(*place) != *true_place => {
                             wrong.push(format!(
-                                "seed {seed}, {} places, {} wanted, scatter: hit {hit} (good {}) at {true_place:?} was given to {place}",
+                                "seed {seed}, {} places, {} wanted: hit {hit} (good {}) at {true_place:?} was given to {place}",
                                 order.names.len(),
                                 order.wanted,
                                 hits[hit].good
@@ -230,8 +235,8 @@ fn drawn_sessions_are_fitted_without_a_wrong_place() {
     let ([fitted, asked, left, hits], wrong) = drawn(0, &USUAL);
     println!("usual: {fitted} fitted, {asked} asked, {left} of {hits} hits left out, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{} wrong: {:#?}", wrong.len(), &wrong[..wrong.len().min(20)]);
-    // most sessions need no question, or the question would be worth nothing
-    assert!(asked * 4 < fitted, "{asked} asked, {fitted} fitted");
+    // questions arise where two hits are wanted and one is missing: hits beside the point look alike
+    assert!(asked * 2 < fitted, "{asked} asked, {fitted} fitted");
     // good hits are rarely left out
     assert!(left * 100 < hits, "{left} of {hits}");
 }
@@ -260,21 +265,24 @@ fn exact(skipped: &[usize]) -> Session {
 }
 
 #[test]
-fn a_skipped_place_is_asked_about_and_one_name_answers() {
+fn a_skipped_place_is_asked_about_and_names_answer() {
     let Session { hits, truth, order } = exact(&[2]);
     let mut named = vec![None; hits.len()];
     let Unclear { questions, visits } = fit(&hits, &order, &named).expect_err("five of six");
     assert_eq!(visits.len(), 5);
     assert!(questions[0].contains("hits 1-20") && questions[0].contains("at 5 places"), "{questions:?}");
     assert!(questions[0].contains("has 6 here (P0 to P5)"), "{questions:?}");
-    // the third visit was at the fourth place
+    // the third visit was at the fourth place: one of the first three places was skipped
     named[9] = Some(Named::Place(3));
+    let Unclear { questions, .. } = fit(&hits, &order, &named).expect_err("two of three");
+    assert!(questions[0].contains("hits 1-8") && questions[0].contains("has 3 here (P0 to P2)"), "{questions:?}");
+    named[4] = Some(Named::Place(1));
     let fitted = fit(&hits, &order, &named).expect("one reading is left");
     assert_eq!(fitted.places, truth);
-    // a name that contradicts the number of places before it leaves the question open
+    // a name that contradicts the number of places between is no answer
     named[9] = Some(Named::Place(4));
-    let Unclear { questions, .. } = fit(&hits, &order, &named).expect_err("two of four");
-    assert!(questions[0].contains("hits 1-8") && questions[0].contains("has 4 here"), "{questions:?}");
+    let Unclear { questions, .. } = fit(&hits, &order, &named).expect_err("two places after the fifth");
+    assert!(questions[0].contains("hits 13-20") && questions[0].contains("has 1 here (P5)"), "{questions:?}");
 }
 
 #[test]
