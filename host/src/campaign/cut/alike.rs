@@ -167,7 +167,11 @@ mod tests {
         (force, response)
     }
 
-    fn difference(one: ([f64; 3], &[(f64, f64)]), other: ([f64; 3], &[(f64, f64)]), noise: f64) -> Option<f64> {
+    fn difference(
+        one: ([f64; 3], &[(f64, f64)]),
+        other: ([f64; 3], &[(f64, f64)]),
+        noise: f64,
+    ) -> Option<f64> {
         let answers = Answers::new(FS_HZ, 2048, 3e-3);
         let of = |(shapes, pulses), seed| {
             let (force, response) = hit(shapes, pulses, noise, seed);

@@ -206,7 +206,8 @@ impl HitFinder {
             }
             match &mut self.open {
                 None => {
-                    let hit = FoundHit { start: scan, peak_scan: scan, peak_n: force, width_s: 0.0, pulses: 1 };
+                    let hit =
+                        FoundHit { start: scan, peak_scan: scan, peak_n: force, width_s: 0.0, pulses: 1 };
                     self.open = Some(Open { hit, last_above: scan, released: false });
                 }
                 Some(open) => {
@@ -296,7 +297,12 @@ mod tests {
         assert!(at.iter().zip(wanted).all(|(one, other)| (0.0..1e-3).contains(&(one - other))), "{at:?}");
         assert_eq!(found.iter().map(|hit| hit.pulses).collect::<Vec<_>>(), [1, 1, 1, 2, 1, 1]);
         // hum of 2 N and four times the noise of 0.3 N
-        assert!(found.iter().zip([40.0, 40.0, 40.0, 40.0, 12.0, 40.0]).all(|(hit, n)| (hit.peak_n - n).abs() < 3.5));
+        assert!(
+            found
+                .iter()
+                .zip([40.0, 40.0, 40.0, 40.0, 12.0, 40.0])
+                .all(|(hit, n)| (hit.peak_n - n).abs() < 3.5)
+        );
         assert!((found[1].width_s - 4e-3).abs() < 1.2e-3, "{}", found[1].width_s);
     }
 

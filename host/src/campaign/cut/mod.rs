@@ -1,4 +1,4 @@
-//! Cuts a continuous recording into the hits of a campaign, and into levels of the shaker.
+//! Cuts a continuous recording into the hits of a campaign.
 //!
 //! | step | where |
 //! |---|---|
@@ -7,7 +7,6 @@
 //! | how much the structure's answer differs between two hits | [`alike`] |
 //! | which place of the plan each hit was at, or what to ask | [`places`] |
 //! | what the user states about the places | [`stated`] |
-//! | steady parts of a shaker's recording | [`levels`] |
 //!
 //! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns the
 //! samples of one as a record of the plan's length, which `campaign::import` stores. The recording
@@ -15,7 +14,6 @@
 
 pub mod alike;
 pub mod hits;
-pub mod levels;
 pub mod places;
 #[cfg(test)]
 mod places_tests;
@@ -28,7 +26,7 @@ use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_protocol::shot::{Phase, Shot};
 
 use self::alike::{Answer, Answers};
-use self::hits::{FoundHit, ForceLevels, HitCriteria, HitFinder};
+use self::hits::{ForceLevels, FoundHit, HitCriteria, HitFinder};
 use self::places::{Fitted, HitEvidence, Named, PlaceOrder, Unclear};
 use self::recording::LongRecording;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
@@ -104,9 +102,9 @@ pub struct Only<'o> {
 pub fn places_of(plan: &Plan, only: &Only<'_>) -> Result<Vec<Place>, String> {
     let configuration = match only.configuration {
         None => None,
-        Some(name) => Some(
-            plan.configuration(name).ok_or_else(|| format!("the plan has no configuration `{name}`"))?,
-        ),
+        Some(name) => {
+            Some(plan.configuration(name).ok_or_else(|| format!("the plan has no configuration `{name}`"))?)
+        }
     };
     let mut places: Vec<Place> = Vec::new();
     for cell in plan.cells() {
@@ -122,7 +120,8 @@ pub fn places_of(plan: &Plan, only: &Only<'_>) -> Result<Vec<Place>, String> {
         match row.filter(|_| fixed(&cell.response)) {
             Some(place) => place.responses.push(cell.response),
             None => {
-                let name = format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response);
+                let name =
+                    format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response);
                 places.push(Place { responses: vec![cell.response.clone()], cell, name });
             }
         }
@@ -131,7 +130,10 @@ pub fn places_of(plan: &Plan, only: &Only<'_>) -> Result<Vec<Place>, String> {
         places.retain(|place| place.responses.iter().any(|own| own == response));
     }
     if places.is_empty() {
-        return Err("the plan has no such place: `jointrig plan check` lists configurations, impacts and responses".into());
+        return Err(
+            "the plan has no such place: `jointrig plan check` lists configurations, impacts and responses"
+                .into(),
+        );
     }
     Ok(places)
 }
@@ -265,7 +267,9 @@ fn judged(
     };
     let all: Vec<usize> = (0..map.len()).collect();
     let samples = recording.part(&all, range.clone())?;
-    if let Some((channel, at)) = samples.each().enumerate().find_map(|(channel, own)| Some((channel, own.not_finite()?))) {
+    if let Some((channel, at)) =
+        samples.each().enumerate().find_map(|(channel, own)| Some((channel, own.not_finite()?)))
+    {
         hit.incomplete = Some(format!(
             "channel `{}` has a value that is not a number at {:.4} s",
             map.channels[channel].name,
@@ -290,7 +294,12 @@ fn judged(
         hit.answer = answers.of(force_n, responses, &signals(&quiet, before));
     }
     let recording = as_measured(samples, &found, (found.start - range.start) as usize);
-    let cell = Cell { configuration: jointrig_protocol::request::Configuration::A, impact: String::new(), response: String::new(), wanted: 0 };
+    let cell = Cell {
+        configuration: jointrig_protocol::request::Configuration::A,
+        impact: String::new(),
+        response: String::new(),
+        wanted: 0,
+    };
     hit.verdict = Some(ByRecord.judge(&cell, plan, map, &recording, &Others::default()));
     Ok(hit)
 }

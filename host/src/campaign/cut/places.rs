@@ -35,6 +35,8 @@ const MOST_SAME: f64 = 0.5;
 const SMALLEST: f64 = 0.02;
 /// The hits of a group that a further hit is compared with: the last ones, because structures drift.
 const COMPARED: usize = 4;
+/// A first group of at most this many good hits, if fewer than wanted, may be test taps.
+const MOST_TAPS: usize = 3;
 /// A pause is clear if it is this many times as long as nine of ten pauses between hits of a place.
 const CLEAR_PAUSE: f64 = 1.5;
 
@@ -177,7 +179,11 @@ fn numbers(hits: &[usize]) -> String {
     }
     let text: Vec<String> = ranges
         .iter()
-        .map(|[first, last]| if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) })
+        .map(
+            |[first, last]| {
+                if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) }
+            },
+        )
         .collect();
     format!("hit{} {}", if hits.len() == 1 { "" } else { "s" }, text.join(", "))
 }
@@ -186,7 +192,8 @@ impl<'f> Fit<'f> {
     fn new(hits: &'f [HitEvidence], order: &'f PlaceOrder, named: &'f [Option<Named>]) -> Self {
         let nothing = Limits { same: SAME, other: OTHER };
         let group_of = vec![None; hits.len()];
-        let mut fit = Self { hits, order, named, limits: nothing, groups: Vec::new(), group_of, questions: Vec::new() };
+        let mut fit =
+            Self { hits, order, named, limits: nothing, groups: Vec::new(), group_of, questions: Vec::new() };
         let good = fit.good();
         let differences = good.windows(2).filter_map(|two| fit.difference(two[0], two[1])).collect();
         fit.limits = Limits::of(differences);
@@ -199,7 +206,9 @@ impl<'f> Fit<'f> {
 
     /// The good hits that may be at a place.
     fn good(&self) -> Vec<usize> {
-        (0..self.hits.len()).filter(|hit| self.hits[*hit].good && self.said(*hit) != Some(Named::Nowhere)).collect()
+        (0..self.hits.len())
+            .filter(|hit| self.hits[*hit].good && self.said(*hit) != Some(Named::Nowhere))
+            .collect()
     }
 
     fn difference(&self, one: usize, other: usize) -> Option<f64> {
@@ -238,10 +247,13 @@ impl<'f> Fit<'f> {
                 .filter_map(|(group, distance)| distance.map(|distance| (group, distance)))
                 .min_by(|a, b| a.1.total_cmp(&b.1));
             let is_same = |group: usize| distances[group].is_some_and(|d| d <= self.limits.same);
-            let matching = current.filter(|group| is_same(*group)).or(nearest.map(|(group, _)| group).filter(|group| is_same(*group)));
+            let matching = current
+                .filter(|group| is_same(*group))
+                .or(nearest.map(|(group, _)| group).filter(|group| is_same(*group)));
             let joined = match (said, matching) {
                 (Some(place), matching) => {
-                    let known = self.groups.iter().position(|group| group.named && group.place == Some(place));
+                    let known =
+                        self.groups.iter().position(|group| group.named && group.place == Some(place));
                     let free = matching.filter(|group| !self.groups[*group].named);
                     let group = known.or(free).unwrap_or_else(|| self.new_group());
                     self.groups[group].place = Some(place);
@@ -269,7 +281,8 @@ impl<'f> Fit<'f> {
         for (hit, before) in unsure {
             let after = self.group_of[hit + 1..].iter().copied().flatten().next();
             let within = before.filter(|group| after == Some(*group));
-            let close = within.filter(|group| self.from_group(hit, *group).is_none_or(|d| d < self.limits.other));
+            let close =
+                within.filter(|group| self.from_group(hit, *group).is_none_or(|d| d < self.limits.other));
             match close {
                 Some(group) => {
                     self.groups[group].members.push(hit);
@@ -299,7 +312,8 @@ impl<'f> Fit<'f> {
 
     /// The groups that count as places, in the order in which they were first struck.
     fn sequence(&self) -> Vec<usize> {
-        let mut sequence: Vec<usize> = (0..self.groups.len()).filter(|group| self.counts(&self.groups[*group])).collect();
+        let mut sequence: Vec<usize> =
+            (0..self.groups.len()).filter(|group| self.counts(&self.groups[*group])).collect();
         sequence.sort_by_key(|group| self.groups[*group].members.first().copied());
         sequence
     }
@@ -310,7 +324,8 @@ impl<'f> Fit<'f> {
             return;
         }
         let all = self.order.names.len();
-        let taken: Vec<usize> = self.groups.iter().filter(|group| group.named).filter_map(|group| group.place).collect();
+        let taken: Vec<usize> =
+            self.groups.iter().filter(|group| group.named).filter_map(|group| group.place).collect();
         let sequence = self.sequence();
         let mut from = 0;
         let mut run: Vec<usize> = Vec::new();
@@ -395,7 +410,12 @@ impl<'f> Fit<'f> {
         let is_clear = |pause_s: f64| usual.is_some_and(|usual| pause_s >= CLEAR_PAUSE * usual);
         for (number, group) in sequence.iter().enumerate() {
             let group = &self.groups[*group];
-            if group.named || wanted == 1 || 2 * group.members.len() > wanted || sequence.len() == 1 {
+            let few = if number == 0 {
+                (wanted / 2).max(MOST_TAPS.min(wanted.saturating_sub(1)))
+            } else {
+                wanted / 2
+            };
+            if group.named || wanted == 1 || group.members.len() > few || sequence.len() == 1 {
                 continue;
             }
             // a few hits beside the point have no pause on one side; test taps come first

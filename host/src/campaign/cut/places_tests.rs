@@ -244,7 +244,10 @@ fn drawn_sessions_are_fitted_without_a_wrong_place() {
 #[test]
 fn drawn_careless_sessions_are_asked_about() {
     let ([fitted, asked, left, hits], wrong) = drawn(1_000_000, &CARELESS);
-    println!("careless: {fitted} fitted, {asked} asked, {left} of {hits} hits left out, {} wrong", wrong.len());
+    println!(
+        "careless: {fitted} fitted, {asked} asked, {left} of {hits} hits left out, {} wrong",
+        wrong.len()
+    );
     assert!(wrong.is_empty(), "{} wrong: {:#?}", wrong.len(), &wrong[..wrong.len().min(20)]);
     assert!(fitted > 0 && asked > fitted);
 }
@@ -275,7 +278,10 @@ fn a_skipped_place_is_asked_about_and_names_answer() {
     // the third visit was at the fourth place: one of the first three places was skipped
     named[9] = Some(Named::Place(3));
     let Unclear { questions, .. } = fit(&hits, &order, &named).expect_err("two of three");
-    assert!(questions[0].contains("hits 1-8") && questions[0].contains("has 3 here (P0 to P2)"), "{questions:?}");
+    assert!(
+        questions[0].contains("hits 1-8") && questions[0].contains("has 3 here (P0 to P2)"),
+        "{questions:?}"
+    );
     named[4] = Some(Named::Place(1));
     let fitted = fit(&hits, &order, &named).expect("one reading is left");
     assert_eq!(fitted.places, truth);

@@ -236,10 +236,7 @@ impl LongRecording {
 }
 
 /// The arrays of an npz file, where each channel lies in them, and the number of scans.
-fn arrays(
-    npz: &mut NpzFile,
-    names: &[String],
-) -> Result<(Vec<LongArray>, Vec<Signal>, u64), CutError> {
+fn arrays(npz: &mut NpzFile, names: &[String]) -> Result<(Vec<LongArray>, Vec<Signal>, u64), CutError> {
     const SIGNALS: &str = "signals";
     if !npz.has(SIGNALS) {
         let mut all = Vec::new();
@@ -296,9 +293,14 @@ fn type_of(array: &LongArray) -> SampleType {
 fn decode(own: &mut ChannelSamples, bytes: &[u8], step: usize, big: bool) {
     macro_rules! each {
         ($samples:ident, $of:ty) => {
-            $samples.extend(bytes.as_chunks().0.iter().step_by(step).map(|word| {
-                if big { <$of>::from_be_bytes(*word) } else { <$of>::from_le_bytes(*word) }
-            }))
+            $samples.extend(
+                bytes
+                    .as_chunks()
+                    .0
+                    .iter()
+                    .step_by(step)
+                    .map(|word| if big { <$of>::from_be_bytes(*word) } else { <$of>::from_le_bytes(*word) }),
+            )
         };
     }
     match own {
@@ -337,5 +339,6 @@ fn quantity_of(label: &str) -> Result<(Quantity, f64), String> {
         format!("its unit `{label}`: {error}; write N, m/s, mm/s, m/s^2, g, m, µm or another unit of force or motion")
     })?;
     let kind = kinds.into_iter().find(|(dimension, _)| *dimension == unit.dimension);
-    kind.map(|(_, quantity)| (quantity, unit.factor)).ok_or_else(|| format!("its unit `{label}` is no force or motion"))
+    kind.map(|(_, quantity)| (quantity, unit.factor))
+        .ok_or_else(|| format!("its unit `{label}` is no force or motion"))
 }

@@ -90,15 +90,19 @@ pub fn from_table(
             (false, true) => {
                 for hit in hits_of(&row.hit, at_s.len()).map_err(wrong)? {
                     if named[hit].is_some_and(|other| other != place) {
-                        return Err(wrong(format!("hit {} is already at another place in the table", hit + 1)));
+                        return Err(wrong(format!(
+                            "hit {} is already at another place in the table",
+                            hit + 1
+                        )));
                     }
                     named[hit] = Some(place);
                 }
             }
             (true, false) => {
-                let time: f64 = row.time_s.replace(',', ".").parse().ok().filter(|t: &f64| t.is_finite()).ok_or_else(
-                    || wrong(format!("`{}` is no time in s from the recording's start", row.time_s)),
-                )?;
+                let time: f64 =
+                    row.time_s.replace(',', ".").parse().ok().filter(|t: &f64| t.is_finite()).ok_or_else(
+                        || wrong(format!("`{}` is no time in s from the recording's start", row.time_s)),
+                    )?;
                 if from_time.last().is_some_and(|(before, _)| *before >= time) {
                     return Err(wrong("times must increase".into()));
                 }
@@ -122,14 +126,22 @@ pub fn from_table(
 pub fn to_complete(places: &[Place], stretches: &[Visit]) -> String {
     let line = |visit: &Visit| {
         let [first, last] = visit.hits;
-        let hits = if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) };
+        let hits =
+            if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) };
         match visit.place {
             None => format!("{hits},?,?,?\n"),
             Some(place) => {
                 let cell = &places[place].cell;
-                format!("{hits},{},{},{}\n", configuration_name(cell.configuration), cell.impact, cell.response)
+                format!(
+                    "{hits},{},{},{}\n",
+                    configuration_name(cell.configuration),
+                    cell.impact,
+                    cell.response
+                )
             }
         }
     };
-    std::iter::once("hit,configuration,impact,response\n".to_owned()).chain(stretches.iter().map(line)).collect()
+    std::iter::once("hit,configuration,impact,response\n".to_owned())
+        .chain(stretches.iter().map(line))
+        .collect()
 }

@@ -1,1 +1,0 @@
-//! Steady parts of a shaker's recording.
