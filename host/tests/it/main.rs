@@ -4,6 +4,7 @@ mod accuracy;
 mod averaged;
 mod between_arms;
 mod cmif;
+mod cut;
 mod decoupling_reference;
 mod explained;
 mod fit;
