@@ -38,7 +38,12 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
 fn refused(folder: &Path, arguments: &[&str], code: i32) -> String {
     let out = jointrig(folder, arguments);
     let said = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {said}{}", String::from_utf8_lossy(&out.stdout));
+    assert_eq!(
+        out.status.code(),
+        Some(code),
+        "{arguments:?}: {said}{}",
+        String::from_utf8_lossy(&out.stdout)
+    );
     said
 }
 
@@ -46,12 +51,15 @@ fn refused(folder: &Path, arguments: &[&str], code: i32) -> String {
 fn plan(impacts: usize, responses: usize, wanted: usize) -> String {
     let list = |prefix: &str, count: usize, more: &str| -> String {
         (1..=count)
-            .map(|i| format!("{{ name = \"{prefix}{i}\", grouping = 1, position_m = [0.0{i}, 0.02, 0.03]{more} }}"))
+            .map(|i| {
+                format!("{{ name = \"{prefix}{i}\", grouping = 1, position_m = [0.0{i}, 0.02, 0.03]{more} }}")
+            })
             .collect::<Vec<_>>()
             .join(",\n    ")
     };
-    let names =
-        |prefix: &str, count: usize| (1..=count).map(|i| format!("\"{prefix}{i}\"")).collect::<Vec<_>>().join(", ");
+    let names = |prefix: &str, count: usize| {
+        (1..=count).map(|i| format!("\"{prefix}{i}\"")).collect::<Vec<_>>().join(", ")
+    };
     format!(
         r#"version = 1
 name = "cut"
@@ -149,8 +157,7 @@ fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<V
     let scans = (length_s * FS_HZ) as usize;
     // products of the shapes at hammer and sensor, for each place, axis and mode; the last is elsewhere
     let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
-    let shapes: Vec<[[f64; 5]; 3]> =
-        (0..=places).map(|_| [0; 3].map(|_| [0; 5].map(|_| normal()))).collect();
+    let shapes: Vec<[[f64; 5]; 3]> = (0..=places).map(|_| [0; 3].map(|_| [0; 5].map(|_| normal()))).collect();
     let mut all = vec![vec![0.0; scans]; 4];
     for (i, value) in all[0].iter_mut().enumerate() {
         let t = i as f64 / FS_HZ;
@@ -167,7 +174,8 @@ fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<V
         let mut state = [Complex::new(0.0, 0.0); 5];
         let poles = MODES.map(|hz| (Complex::new(-DAMPING, 1.0) * (TAU * hz / FS_HZ)).exp());
         // a person hits within a millimetre: the shapes vary by 2 %
-        let own = shapes[strike.place.unwrap_or(places)].map(|axis| axis.map(|shape| shape * (1.0 + 0.02 * normal())));
+        let own = shapes[strike.place.unwrap_or(places)]
+            .map(|axis| axis.map(|shape| shape * (1.0 + 0.02 * normal())));
         for scan in from..until {
             let t = scan as f64 / FS_HZ;
             let force: f64 = pulses
@@ -181,7 +189,8 @@ fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<V
                 *mode = *mode * pole + force * 1e-5;
             }
             for (axis, shapes) in own.iter().enumerate() {
-                all[axis + 1][scan] += shapes.iter().zip(&state).map(|(shape, mode)| shape * mode.re).sum::<f64>();
+                all[axis + 1][scan] +=
+                    shapes.iter().zip(&state).map(|(shape, mode)| shape * mode.re).sum::<f64>();
             }
         }
     }
@@ -339,12 +348,16 @@ fn a_skipped_place_is_asked_about_and_a_table_answers() {
     assert!(told.contains("A/H2/S2: no hits") && told.contains("20 hits, 20 of them good"), "{told}");
     assert_eq!(check(&folder.join("c.jrig"), &person.strikes, RESPONSES), [20, 20]);
     // another table would put stored hits elsewhere
-    std::fs::write(folder.join("places.csv"), "hit,configuration,impact,response\n5,A,H1,S2\n9-12,A,H2,S2\n13-16,A,H2,S1\n")
-        .expect("written");
+    std::fs::write(
+        folder.join("places.csv"),
+        "hit,configuration,impact,response\n5,A,H1,S2\n9-12,A,H2,S2\n13-16,A,H2,S1\n",
+    )
+    .expect("written");
     let said = refused(folder, &[&cut[..], &["--table", "places.csv"]].concat(), 1);
     assert!(said.contains("is stored at A/") && said.contains("campaign drop"), "{said}");
     // times name places as well, and an unknown place is refused with the plan's
-    std::fs::write(folder.join("times.csv"), "time_s;configuration;impact;response\n0;A;H9;S1\n").expect("written");
+    std::fs::write(folder.join("times.csv"), "time_s;configuration;impact;response\n0;A;H9;S1\n")
+        .expect("written");
     let said = refused(folder, &[&cut[..], &["--table", "times.csv"]].concat(), 1);
     assert!(said.contains("line 2") && said.contains("A/H9/S1 is no place"), "{said}");
 }
