@@ -9,7 +9,7 @@ use super::npz::{Bytes, NpzError, NpzFile};
 use crate::{advice, untrusted_input};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// An array whose values stay in the file until they are read.
 pub struct LongArray {
@@ -90,11 +90,6 @@ impl LongArray {
                 advice::reading(&error)
             ),
         })
-    }
-
-    /// The file's path, for messages.
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 }
 

@@ -23,6 +23,7 @@ pub mod stated;
 use std::ops::Range;
 
 use jointrig_protocol::channel::{Quantity, Role};
+use jointrig_protocol::request::Configuration;
 use jointrig_protocol::shot::{Phase, Shot};
 
 use self::alike::{Answer, Answers};
@@ -294,12 +295,9 @@ fn judged(
         hit.answer = answers.of(force_n, responses, &signals(&quiet, before));
     }
     let recording = as_measured(samples, &found, (found.start - range.start) as usize);
-    let cell = Cell {
-        configuration: jointrig_protocol::request::Configuration::A,
-        impact: String::new(),
-        response: String::new(),
-        wanted: 0,
-    };
+    // records are judged without regard to their cell
+    let cell =
+        Cell { configuration: Configuration::A, impact: String::new(), response: String::new(), wanted: 0 };
     hit.verdict = Some(ByRecord.judge(&cell, plan, map, &recording, &Others::default()));
     Ok(hit)
 }

@@ -22,7 +22,7 @@ use super::CutError;
 use crate::campaign::import::roles::role_of;
 use crate::campaign::plan::Plan;
 use crate::device::channels::ChannelMap;
-use crate::device::samples::{ChannelSamples, SampleType, Samples};
+use crate::device::samples::{ChannelSamples, ChannelView, SampleType, Samples};
 use crate::exchange::NpzError;
 use crate::exchange::npz::NpzFile;
 use crate::exchange::npz_long::LongArray;
@@ -272,9 +272,12 @@ fn arrays(npz: &mut NpzFile, names: &[String]) -> Result<(Vec<LongArray>, Vec<Si
     };
     // in Fortran order the first index runs fastest
     let one_after_another = by_channel != array.fortran;
-    let signal = |channel: usize| match one_after_another {
-        true => Signal { array: 0, first: (channel * scans) as u64, step: 1 },
-        false => Signal { array: 0, first: channel as u64, step: channels as u64 },
+    let signal = |channel: usize| {
+        if one_after_another {
+            Signal { array: 0, first: (channel * scans) as u64, step: 1 }
+        } else {
+            Signal { array: 0, first: channel as u64, step: channels as u64 }
+        }
     };
     let signals = (0..channels).map(signal).collect();
     Ok((vec![array], signals, scans as u64))
@@ -312,8 +315,7 @@ fn decode(own: &mut ChannelSamples, bytes: &[u8], step: usize, big: bool) {
 }
 
 /// Appends samples of the same type.
-fn append(own: &mut ChannelSamples, more: crate::device::samples::ChannelView<'_>) {
-    use crate::device::samples::ChannelView;
+fn append(own: &mut ChannelSamples, more: ChannelView<'_>) {
     match (own, more) {
         (ChannelSamples::I16(own), ChannelView::I16(more)) => own.extend_from_slice(more),
         (ChannelSamples::I32(own), ChannelView::I32(more)) => own.extend_from_slice(more),

@@ -10,7 +10,7 @@ use crate::campaign::cut::{CutError, CutHit, Only, Place, assign, cut_hit, find_
 use crate::campaign::import::{CellName, Hit, Origin, add_hits};
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::store::Store;
-use crate::campaign::verdict::Verdict;
+use crate::campaign::verdict::{Judgement, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output::{self, Waiting};
 use crate::exchange::frf_file;
@@ -125,7 +125,7 @@ pub(super) fn import(from: &Recorded<'_>) -> Result<(), CliError> {
                 impact: &cell.impact,
                 response: &cell.response,
             };
-            let mut tell = |hit, verdict: &crate::campaign::verdict::Judgement| {
+            let mut tell = |hit, verdict: &Judgement| {
                 if verdict.kind != Verdict::Good {
                     tell_line!("{}: hit {hit}: {} ({})", place.name, verdict.kind, verdict.sentence);
                 }
