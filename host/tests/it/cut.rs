@@ -213,19 +213,27 @@ fn array(zip: &mut zip::ZipWriter<std::fs::File>, name: &str, descr: &str, shape
 
 /// As numpy.savez writes it, channel after channel or scan after scan.
 fn write(path: &Path, signals: &[Vec<f32>], by_channel: bool) {
+    write_named(path, &["hammer", "x", "y", "z"], &["N", "m/s", "m/s", "m/s"], signals, by_channel);
+}
+
+fn write_named(path: &Path, names: &[&str], units: &[&str], signals: &[Vec<f32>], by_channel: bool) {
     let mut zip = zip::ZipWriter::new(std::fs::File::create(path).expect("a file"));
     array(&mut zip, "fs", "<f8", "()", &FS_HZ.to_le_bytes());
-    let texts = |all: [&str; 4]| -> Vec<u8> {
-        all.iter().flat_map(|text| format!("{text:\0<6}").into_bytes()).collect()
+    let texts = |all: &[&str]| -> Vec<u8> {
+        all.iter().flat_map(|text| format!("{text:\0<10}").into_bytes()).collect()
     };
-    array(&mut zip, "names", "|S6", "(4,)", &texts(["hammer", "x", "y", "z"]));
-    array(&mut zip, "units", "|S6", "(4,)", &texts(["N", "m/s", "m/s", "m/s"]));
+    let count = signals.len();
+    array(&mut zip, "names", "|S10", &format!("({count},)"), &texts(names));
+    array(&mut zip, "units", "|S10", &format!("({count},)"), &texts(units));
     let scans = signals[0].len();
     let (shape, values): (String, Vec<u8>) = if by_channel {
-        (format!("(4, {scans})"), signals.iter().flatten().flat_map(|value| value.to_le_bytes()).collect())
+        (
+            format!("({count}, {scans})"),
+            signals.iter().flatten().flat_map(|value| value.to_le_bytes()).collect(),
+        )
     } else {
         let scan = |scan: usize| signals.iter().flat_map(move |signal| signal[scan].to_le_bytes());
-        (format!("({scans}, 4)"), (0..scans).flat_map(scan).collect())
+        (format!("({scans}, {count})"), (0..scans).flat_map(scan).collect())
     };
     array(&mut zip, "signals", "<f4", &shape, &values);
     zip.finish().expect("closed");
@@ -394,4 +402,57 @@ fn recordings_that_cannot_be_cut_are_refused_with_the_reason() {
     let told = done(folder, &cut);
     assert!(told.contains("hit 6") && told.contains("a record of the plan needs"), "{told}");
     assert!(told.contains("5 hits, 5 of them good"), "{told}");
+}
+
+#[test]
+fn levels_of_a_shaker_are_cut_without_their_transitions() {
+    // frequency (Hz), amplitude of the displacement (m), steady time (s); a ramp of half a second
+    // before each
+    let levels = [(60.0, 1e-6, 4.0), (60.0, 3e-6, 4.0), (95.3, 2e-6, 5.0)];
+    let (mut now_s, mut phase, mut before, mut all) = (0.0, 0.0_f64, 0.0, vec![Vec::new(); 4]);
+    let mut dice = Xoshiro256PlusPlus::seed_from_u64(12);
+    for (hz, amplitude, steady_s) in levels.into_iter().chain([(60.0, 0.0, 1.0)]) {
+        let scans = ((steady_s + 0.5) * FS_HZ) as usize;
+        for scan in 0..scans {
+            let ramp = (scan as f64 / FS_HZ / 0.5).min(1.0);
+            let now = before + (amplitude - before) * ramp;
+            phase += TAU * hz / FS_HZ;
+            let noise: f64 = StandardNormal.sample(&mut dice);
+            // a stiffness of 100 N/um; both specimens move, A five times as far
+            let velocity = TAU * hz * now * phase.cos();
+            let force = 1e8 * now * phase.sin();
+            let values = [1.25 * velocity, 0.25 * velocity + 1e-9 * noise, force + 1e-3 * noise, force * 1.1];
+            all.iter_mut().zip(values).for_each(|(own, value)| own.push(value as f32));
+        }
+        before = amplitude;
+        now_s += steady_s + 0.5;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let units = ["m/s", "m/s", "N", "N"];
+    write_named(&folder.join("shaker.npz"), &["LDV_A", "LDV_B", "LC1", "excitation"], &units, &all, true);
+    let own = plan(1, 1, 2)
+        .replace("[geometry]", "[shaker]\nfrequencies_hz = [60.0]\namplitudes_m = [1e-6, 3e-6]\n[geometry]");
+    std::fs::write(folder.join("plan.toml"), own).expect("written");
+    done(folder, &["campaign", "new", "c.jrig", "--plan", "plan.toml"]);
+    let cut = ["import", "shaker.npz", "--into", "c.jrig", "--cut", "--levels", "before"];
+    let told = done(folder, &cut);
+    assert!(told.contains("3 steady parts") && told.contains("c.jrig: 3 levels before the cells"), "{told}");
+    assert!(told.contains("60 Hz, 3 µm") && told.contains("not in the plan"), "{told}");
+    let store = Store::open_read_only(&folder.join("c.jrig")).expect("a campaign");
+    let rows: Vec<_> = store.levels().expect("levels").into_iter().flatten().collect();
+    assert_eq!(rows.len(), 3);
+    for (row, (hz, amplitude, _)) in rows.iter().zip(levels) {
+        // noise of a ten-thousandth over three seconds
+        assert!((row.frequency_hz - hz).abs() < 1e-3, "{}", row.frequency_hz);
+        assert!((row.reached / amplitude - 1.0).abs() < 5e-3, "{}", row.reached);
+        assert!(row.scans as f64 > 3.0 * FS_HZ, "{}", row.scans);
+    }
+    assert_eq!((rows[0].frequency_hz, rows[1].amplitude), (60.0, 3e-6));
+    drop(store);
+    assert!(now_s > 14.0 && done(folder, &cut).contains("3 were there already"));
+    // a recording without a sine has no level
+    all.iter_mut().for_each(|own| own.truncate(300));
+    write_named(&folder.join("shaker.npz"), &["LDV_A", "LDV_B", "LC1", "excitation"], &units, &all, true);
+    assert!(refused(folder, &cut, 1).contains("channel `excitation` has no part"));
 }

@@ -104,7 +104,8 @@ impl SteadyFinder {
     fn line(&mut self) -> Option<BlockLine> {
         let length = self.window.len();
         let mean = self.open.iter().sum::<f64>() / length as f64;
-        let mut windowed: Vec<f64> = self.open.iter().zip(&self.window).map(|(v, w)| (v - mean) * w).collect();
+        let mut windowed: Vec<f64> =
+            self.open.iter().zip(&self.window).map(|(v, w)| (v - mean) * w).collect();
         let mut spectrum = self.transform.make_output_vec();
         self.transform.process(&mut windowed, &mut spectrum).ok()?;
         let power: Vec<f64> = spectrum.iter().map(Complex::norm_sqr).collect();
@@ -121,7 +122,8 @@ impl SteadyFinder {
         let apart = ((2.0 * ratio - 1.0) / (1.0 + ratio)).clamp(0.0, 1.0);
         let offset = sign * apart;
         // the window's response at this distance from the line, relative to its height of N/2
-        let response = if apart < 1e-9 { 1.0 } else { (PI * apart).sin() / (PI * apart * (1.0 - apart * apart)) };
+        let response =
+            if apart < 1e-9 { 1.0 } else { (PI * apart).sin() / (PI * apart * (1.0 - apart * apart)) };
         // a window of this symmetry turns the phase by half a turn over the block per line
         let phase = spectrum[top].arg() / TAU - 0.5 * offset;
         Some(BlockLine {
@@ -165,8 +167,9 @@ impl SteadyFinder {
                 let kept = &turns[1..turns.len() - 1];
                 let frequency_hz = kept.iter().sum::<f64>() / (kept.len() as f64 * block_s);
                 let inner = begin + 1..end - 1;
-                let amplitude = self.blocks[inner.clone()].iter().flatten().map(|block| block.amplitude).sum::<f64>()
-                    / inner.len() as f64;
+                let amplitude =
+                    self.blocks[inner.clone()].iter().flatten().map(|block| block.amplitude).sum::<f64>()
+                        / inner.len() as f64;
                 let seconds = inner.len() as f64 * block_s;
                 if seconds >= self.criteria.least_s && seconds * frequency_hz >= self.criteria.cycles {
                     let scans = (inner.start * length) as u64..(inner.end * length) as u64;

@@ -1,4 +1,4 @@
-//! Cuts a continuous recording into the hits of a campaign.
+//! Cuts a continuous recording into the hits of a campaign, or into levels of the shaker.
 //!
 //! | step | where |
 //! |---|---|
@@ -7,6 +7,7 @@
 //! | how much the structure's answer differs between two hits | [`alike`] |
 //! | which place of the plan each hit was at, or what to ask | [`places`] |
 //! | what the user states about the places | [`stated`] |
+//! | steady parts of a shaker's recording | [`levels`] |
 //!
 //! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns the
 //! samples of one as a record of the plan's length, which `campaign::import` stores. The recording
@@ -14,6 +15,7 @@
 
 pub mod alike;
 pub mod hits;
+pub mod levels;
 pub mod places;
 #[cfg(test)]
 mod places_tests;
@@ -28,9 +30,12 @@ use jointrig_protocol::shot::{Phase, Shot};
 
 use self::alike::{Answer, Answers};
 use self::hits::{ForceLevels, FoundHit, HitCriteria, HitFinder};
+use self::levels::{SteadyCriteria, SteadyFinder, SteadyPart};
 use self::places::{Fitted, HitEvidence, Named, PlaceOrder, Unclear};
 use self::recording::LongRecording;
+use crate::campaign::plan::level::{Held, Level};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
+use crate::campaign::run::shaking::Meter;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Judgement, Verdict};
@@ -360,4 +365,101 @@ pub fn assign(
         minimum: own.minimum,
     };
     places::fit(&evidence, &order, named)
+}
+
+/// Longest record of a level, s: more cycles do not make a loop more exact than the sensors are.
+const LONGEST_LEVEL_S: f64 = 30.0;
+/// A level of the plan is meant if its sine stays within this part of a cycle of the recorded one
+/// over the record,
+const SAME_CYCLES: f64 = 0.05;
+/// and its amplitude deviates by at most this, relative.
+const SAME_AMPLITUDE: f64 = 0.1;
+
+/// A level of the shaker in the recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CutLevel {
+    /// Its scans: the steady part, at most thirty seconds from its start.
+    pub scans: Range<u64>,
+    /// The level as the plan orders it, or as measured where the plan has no such level.
+    pub level: Level,
+    /// The amplitude of the specimens' relative displacement, m.
+    pub reached_m: f64,
+    /// Whether the plan has this level.
+    pub planned: bool,
+}
+
+/// Finds the shaker's levels in a recording: the parts in which the reference channel (the
+/// excitation's force, or else the velocity of specimen A) is a sine of constant frequency and
+/// amplitude.
+///
+/// # Errors
+/// There is no such channel or no steady part, or the file cannot be read.
+pub fn find_levels(
+    recording: &LongRecording,
+    plan: &Plan,
+    criteria: SteadyCriteria,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Vec<CutLevel>, CutError> {
+    let (map, scans) = (recording.map(), recording.scans());
+    let wrong = |what: String| CutError::unfit(recording.name(), what);
+    let reference = map.place(Role::Excitation).or(map.place(Role::SpecimenA)).ok_or_else(|| {
+        wrong("no channel is the excitation's force (`excitation`) or a specimen's velocity (`LDV_A`): name them so".into())
+    })?;
+    let mut finder = SteadyFinder::new(map.fs_hz(), criteria);
+    for from in (0..scans).step_by(PIECE as usize) {
+        progress(from, scans);
+        finder.push(&recording.si(reference, from..(from + PIECE).min(scans))?);
+    }
+    let parts = finder.finish();
+    if parts.is_empty() {
+        return Err(wrong(format!(
+            "channel `{}` has no part in which its amplitude stays within {} % for {} s and {} cycles",
+            map.channels[reference].name,
+            100.0 * criteria.tolerance,
+            criteria.least_s,
+            criteria.cycles
+        )));
+    }
+    parts.iter().map(|part| level_of(recording, plan, part)).collect()
+}
+
+/// The level of a steady part.
+fn level_of(recording: &LongRecording, plan: &Plan, part: &SteadyPart) -> Result<CutLevel, CutError> {
+    let map = recording.map();
+    let longest = (LONGEST_LEVEL_S * map.fs_hz()) as u64;
+    let scans = part.scans.start..part.scans.end.min(part.scans.start + longest);
+    let samples = cut_level(recording, scans.clone())?;
+    let reached_m = Meter::new(map, Held::Displacement, part.frequency_hz).amplitude(&samples);
+    let seconds = (scans.end - scans.start) as f64 / map.fs_hz();
+    let mut measured = Level {
+        frequency_hz: part.frequency_hz,
+        end_hz: None,
+        held: Held::Displacement,
+        amplitude: reached_m,
+    };
+    let Some(shaker) = &plan.shaker else {
+        return Ok(CutLevel { scans, level: measured, reached_m, planned: false });
+    };
+    let shaker = shaker.get_ref();
+    let is_frequency = |hz: &&f64| (part.frequency_hz - **hz).abs() * seconds <= SAME_CYCLES;
+    let frequency = shaker.frequencies_hz.iter().find(is_frequency);
+    let amplitude = shaker
+        .amplitudes_m
+        .iter()
+        .filter(|own| (reached_m / **own - 1.0).abs() <= SAME_AMPLITUDE)
+        .min_by(|a, b| (reached_m - **a).abs().total_cmp(&(reached_m - **b).abs()));
+    let planned = frequency.is_some() && amplitude.is_some();
+    if let (Some(frequency_hz), Some(amplitude)) = (frequency, amplitude) {
+        measured = Level { frequency_hz: *frequency_hz, amplitude: *amplitude, ..measured };
+    }
+    Ok(CutLevel { scans, level: measured, reached_m, planned })
+}
+
+/// The samples of a level's record, each channel of the type in which it came.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn cut_level(recording: &LongRecording, scans: Range<u64>) -> Result<Samples, CutError> {
+    let all: Vec<usize> = (0..recording.map().len()).collect();
+    recording.part(&all, scans)
 }

@@ -4,10 +4,14 @@ use std::path::Path;
 
 use super::bad;
 use super::records::{length_notice, origin_of};
+use crate::campaign::cut::levels::SteadyCriteria;
 use crate::campaign::cut::places::{Fitted, Named, Unclear};
 use crate::campaign::cut::recording::LongRecording;
-use crate::campaign::cut::{CutError, CutHit, Only, Place, assign, cut_hit, find_hits, places_of, stated};
-use crate::campaign::import::{CellName, Hit, Origin, add_hits};
+use crate::campaign::cut::{
+    CutError, CutHit, Only, Place, assign, cut_hit, cut_level, find_hits, find_levels, places_of, stated,
+};
+use crate::campaign::import::{CellName, Hit, NewLevelRecord, Origin, add_hits, add_level};
+use crate::campaign::plan::level::{Held, Moment};
 use crate::campaign::plan::{Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::{Judgement, Verdict};
@@ -32,6 +36,8 @@ pub(super) struct Recorded<'r> {
     /// Whether hits are told and not stored.
     pub(super) dry_run: bool,
     pub(super) replace: bool,
+    /// The steady parts of a shaker's recording are wanted, measured before or after the cells.
+    pub(super) levels: Option<Moment>,
 }
 
 impl From<CutError> for CliError {
@@ -55,6 +61,69 @@ fn numbers(hits: &[usize]) -> String {
     ranges.iter().map(text).collect::<Vec<_>>().join(", ")
 }
 
+/// Opens the recording.
+fn open(file: &Path, plan: &Plan) -> Result<LongRecording, CliError> {
+    if frf_file::is_npz(file).map_err(bad)? {
+        return Ok(LongRecording::open_npz(file, plan)?);
+    }
+    Err(bad(format!(
+        "{}: a continuous recording is read from npz, uncompressed: in Python numpy.savez(\"run.npz\", fs=51200, names=[…], \
+         units=[…], signals=array of (channel, sample))",
+        file.display()
+    )))
+}
+
+/// Imports the steady parts of a shaker's recording as levels.
+fn levels(from: &Recorded<'_>, mut store: Store, plan: &Plan, moment: Moment) -> Result<(), CliError> {
+    let recording = open(from.file, plan)?;
+    let waiting = Waiting::of("reading the recording, percent");
+    let found = find_levels(&recording, plan, SteadyCriteria::default(), &mut |done, all| {
+        waiting.at((100 * done / all.max(1)) as usize, 100);
+    })?;
+    drop(waiting);
+    let fs_hz = recording.map().fs_hz();
+    let mut lines = vec![format!(
+        "{}: {:.1} s, {} steady parts (amplitude within {} %, {} s at least)",
+        recording.name(),
+        recording.length_s(),
+        found.len(),
+        100.0 * SteadyCriteria::default().tolerance,
+        SteadyCriteria::default().least_s
+    )];
+    for level in &found {
+        lines.push(format!(
+            "  {:.2} to {:.2} s: {} (reached {}), {}",
+            level.scans.start as f64 / fs_hz,
+            level.scans.end as f64 / fs_hz,
+            level.level,
+            Held::Displacement.show(level.reached_m),
+            if level.planned { "a level of the plan" } else { "not in the plan: stored as measured" }
+        ));
+    }
+    if from.dry_run {
+        lines.push("nothing is stored (--dry-run)".into());
+        return output::lines(lines);
+    }
+    let called = from.file.file_name().unwrap_or(from.file.as_os_str()).to_string_lossy();
+    let origin = origin_of(from.file, &called)?;
+    let mut already = 0;
+    for level in &found {
+        let new = NewLevelRecord {
+            moment,
+            level: level.level,
+            samples: cut_level(&recording, level.scans.clone())?,
+            first_scan: level.scans.start,
+            gaps: Vec::new(),
+        };
+        already += usize::from(add_level(&mut store, &origin, recording.map(), new)?.already);
+    }
+    store.log(&format!("cut {} into {} levels of the shaker", from.file.display(), found.len()))?;
+    store.close()?;
+    let there = if already > 0 { format!(", {already} were there already") } else { String::new() };
+    lines.push(format!("{}: {} levels {} the cells{there}", from.into.display(), found.len(), moment.name()));
+    output::lines(lines)
+}
+
 /// Imports the recording.
 ///
 /// # Errors
@@ -64,6 +133,9 @@ pub(super) fn import(from: &Recorded<'_>) -> Result<(), CliError> {
     let Recorded { file, into, .. } = *from;
     let mut store = if from.dry_run { Store::open_read_only(into)? } else { Store::open(into)? };
     let plan = store.plan()?;
+    if let Some(moment) = from.levels {
+        return levels(from, store, &plan, moment);
+    }
     let places = places_of(&plan, &from.only).map_err(CliError::Usage)?;
     if !from.in_order && from.table.is_none() && places.len() > 1 {
         return Err(CliError::Usage(format!(
@@ -72,14 +144,7 @@ pub(super) fn import(from: &Recorded<'_>) -> Result<(), CliError> {
             places.len()
         )));
     }
-    if !frf_file::is_npz(file).map_err(bad)? {
-        return Err(bad(format!(
-            "{}: a continuous recording is read from npz, uncompressed: in Python numpy.savez(\"run.npz\", fs=51200, names=[…], \
-             units=[…], signals=array of (channel, sample))",
-            file.display()
-        )));
-    }
-    let recording = LongRecording::open_npz(file, &plan)?;
+    let recording = open(file, &plan)?;
     let waiting = Waiting::of("reading the recording, percent");
     let hits = find_hits(&recording, &plan, &mut |done, all| {
         waiting.at((100 * done / all.max(1)) as usize, 100);

@@ -16,6 +16,7 @@ use super::output;
 use crate::analyse;
 use crate::campaign::cut::Only;
 use crate::campaign::import::CellName;
+use crate::campaign::plan::level::Moment;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Verdict;
@@ -87,6 +88,10 @@ pub struct Import {
     /// response.
     #[arg(long, value_name = "TABLE.csv", requires = "cut")]
     table: Option<PathBuf>,
+    /// Continuous recording of the shaker: store its steady parts as levels, measured before or
+    /// after the cells.
+    #[arg(long, value_name = "before|after", requires = "cut", conflicts_with_all = ["order", "table"])]
+    levels: Option<Moment>,
     /// Continuous recording: tell what was found, and store nothing.
     #[arg(long, requires = "cut")]
     dry_run: bool,
@@ -121,6 +126,7 @@ impl Import {
                 table: self.table.as_deref(),
                 dry_run: self.dry_run,
                 replace,
+                levels: self.levels,
             }),
             (None, Some(into), configuration, None, None) if self.file.is_dir() => {
                 let (configuration, names) = (configuration.as_deref(), self.names.as_deref());
