@@ -195,7 +195,9 @@ fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<V
         }
     }
     for axis in &mut all[1..] {
-        axis.iter_mut().for_each(|value| *value += 2e-7 * normal());
+        for value in axis {
+            *value += 2e-7 * normal();
+        }
     }
     all.into_iter().map(|signal| signal.into_iter().map(|value| value as f32).collect()).collect()
 }
@@ -332,7 +334,9 @@ fn a_skipped_place_is_asked_about_and_a_table_answers() {
     const RESPONSES: usize = 2;
     let mut person = Person::new(3);
     for place in [0, 1, 3, 4, 5] {
-        (0..4).for_each(|_| person.good(place));
+        for _ in 0..4 {
+            person.good(place);
+        }
         person.move_on();
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -373,7 +377,9 @@ fn a_skipped_place_is_asked_about_and_a_table_answers() {
 #[test]
 fn recordings_that_cannot_be_cut_are_refused_with_the_reason() {
     let mut person = Person::new(9);
-    (0..6).for_each(|_| person.good(0));
+    for _ in 0..6 {
+        person.good(0);
+    }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let folder = folder.path();
     let good = signals(&person.strikes, 1, person.now_s, 2);
@@ -382,7 +388,9 @@ fn recordings_that_cannot_be_cut_are_refused_with_the_reason() {
     let cut = ["import", "run.npz", "--into", "c.jrig", "--cut", "--order", "plan"];
     let run = folder.join("run.npz");
     let mut turned = good.clone();
-    turned[0].iter_mut().for_each(|force| *force = -*force);
+    for force in &mut turned[0] {
+        *force = -*force;
+    }
     write(&run, &turned, true);
     assert!(refused(folder, &cut, 1).contains("multiply the force by -1"));
     let mut silent = good.clone();
@@ -452,7 +460,9 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
     drop(store);
     assert!(now_s > 14.0 && done(folder, &cut).contains("3 were there already"));
     // a recording without a sine has no level
-    all.iter_mut().for_each(|own| own.truncate(300));
+    for own in &mut all {
+        own.truncate(300);
+    }
     write_named(&folder.join("shaker.npz"), &["LDV_A", "LDV_B", "LC1", "excitation"], &units, &all, true);
     assert!(refused(folder, &cut, 1).contains("channel `excitation` has no part"));
 }

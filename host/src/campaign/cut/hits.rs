@@ -285,7 +285,9 @@ mod tests {
         let mut force = background();
         assert_eq!(find(&force), []);
         let times = [0.01, 5.0, 5.6, 20.0, 59.99];
-        times.iter().for_each(|at| pulse(&mut force, *at, 40.0));
+        for at in times {
+            pulse(&mut force, at, 40.0);
+        }
         // a weak touch, and a bounce after 60 ms
         pulse(&mut force, 30.0, 12.0);
         pulse(&mut force, 20.06, 15.0);
@@ -326,6 +328,6 @@ mod tests {
     fn short_and_empty_signals_give_no_hits() {
         assert_eq!(find(&[]), []);
         assert_eq!(find(&[1.0; 10]), []);
-        assert_eq!(find(&[0.0; 5000]), []);
+        assert_eq!(find(&vec![0.0; 5000]), []);
     }
 }

@@ -123,13 +123,12 @@ pub fn places_of(plan: &Plan, only: &Only<'_>) -> Result<Vec<Place>, String> {
             let lead = &place.cell;
             lead.configuration == cell.configuration && lead.impact == cell.impact && fixed(&lead.response)
         });
-        match row.filter(|_| fixed(&cell.response)) {
-            Some(place) => place.responses.push(cell.response),
-            None => {
-                let name =
-                    format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response);
-                places.push(Place { responses: vec![cell.response.clone()], cell, name });
-            }
+        if let Some(place) = row.filter(|_| fixed(&cell.response)) {
+            place.responses.push(cell.response);
+        } else {
+            let name =
+                format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response);
+            places.push(Place { responses: vec![cell.response.clone()], cell, name });
         }
     }
     if let Some(response) = only.response {

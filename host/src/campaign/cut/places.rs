@@ -216,7 +216,7 @@ impl<'f> Fit<'f> {
     }
 
     /// The median difference of a hit from the last hits of a group.
-    fn from_group(&self, hit: usize, group: usize) -> Option<f64> {
+    fn distance_from(&self, hit: usize, group: usize) -> Option<f64> {
         let members = &self.groups[group].members;
         let others = members.iter().rev().filter(|other| **other != hit).take(COMPARED);
         let mut all: Vec<f64> = others.filter_map(|other| self.difference(hit, *other)).collect();
@@ -236,7 +236,7 @@ impl<'f> Fit<'f> {
         let mut unsure: Vec<(usize, Option<usize>)> = Vec::new();
         for hit in good {
             let distances: Vec<Option<f64>> =
-                (0..self.groups.len()).map(|group| self.from_group(hit, group)).collect();
+                (0..self.groups.len()).map(|group| self.distance_from(hit, group)).collect();
             let said = match self.said(hit) {
                 Some(Named::Place(place)) => Some(place),
                 _ => None,
@@ -282,7 +282,7 @@ impl<'f> Fit<'f> {
             let after = self.group_of[hit + 1..].iter().copied().flatten().next();
             let within = before.filter(|group| after == Some(*group));
             let close =
-                within.filter(|group| self.from_group(hit, *group).is_none_or(|d| d < self.limits.other));
+                within.filter(|group| self.distance_from(hit, *group).is_none_or(|d| d < self.limits.other));
             match close {
                 Some(group) => {
                     self.groups[group].members.push(hit);
@@ -448,7 +448,7 @@ impl<'f> Fit<'f> {
         let is_place = |group: &usize| self.groups[*group].place.is_some();
         let before = self.group_of[..hit].iter().rev().copied().flatten().find(is_place);
         let after = self.group_of[hit + 1..].iter().copied().flatten().find(is_place);
-        let near = |group: usize| self.from_group(hit, group);
+        let near = |group: usize| self.distance_from(hit, group);
         let is_same = |group: usize| near(group).is_some_and(|d| d <= self.limits.same);
         let is_other = |group: usize| near(group).is_some_and(|d| d >= self.limits.other);
         let group = match (before, after) {

@@ -314,7 +314,9 @@ fn hits_that_the_user_rules_out_are_left_out() {
 #[test]
 fn no_good_hit_is_a_question() {
     let Session { mut hits, order, .. } = exact(&[]);
-    hits.iter_mut().for_each(|hit| hit.good = false);
+    for hit in &mut hits {
+        hit.good = false;
+    }
     let named = vec![None; hits.len()];
     assert!(fit(&hits, &order, &named).expect_err("none good").questions[0].contains("no hit is good"));
 }

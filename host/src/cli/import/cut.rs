@@ -233,7 +233,9 @@ fn named(
     };
     if !from.in_order {
         // without an order, a hit that the table does not name is at no place
-        named.iter_mut().for_each(|one| *one = one.or(Some(Named::Nowhere)));
+        for one in &mut named {
+            *one = one.or(Some(Named::Nowhere));
+        }
     }
     Ok(named)
 }
