@@ -5,6 +5,7 @@ mod averaged;
 mod between_arms;
 mod bridge;
 mod cmif;
+mod cut;
 mod decoupling_reference;
 mod explained;
 mod fit;
