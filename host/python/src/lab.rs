@@ -156,7 +156,8 @@ impl Lab {
     ) -> PyResult<Bound<'py, PyDict>> {
         let given = Stated { force_n, channels, units, scale, delay_s }.given(py, &["hit", "sample"])?;
         let cell = (configuration, impact, response);
-        let (added, verdicts) = writing::add_hits(py, &self.path, cell, fs_hz, &given, trigger_index, source, replace)?;
+        let (added, verdicts) =
+            writing::add_hits(py, &self.path, cell, fs_hz, &given, trigger_index, source, replace)?;
         let found = PyDict::new(py);
         found.set_item("hits", added.hits)?;
         found.set_item("kept", added.kept)?;

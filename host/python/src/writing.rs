@@ -64,8 +64,7 @@ impl<'py> Stated<'py> {
         for (name, samples) in &self.channels {
             arrays.push((name.extract()?, samples));
         }
-        let tables =
-            [("units", &self.units), ("scale", &self.scale), ("delay_s", &self.delay_s)].into_iter();
+        let tables = [("units", &self.units), ("scale", &self.scale), ("delay_s", &self.delay_s)].into_iter();
         for (table, stated) in tables.filter_map(|(table, stated)| Some((table, stated.as_ref()?))) {
             for name in stated.keys() {
                 let name: String = name.extract()?;
@@ -74,9 +73,10 @@ impl<'py> Stated<'py> {
                 }
             }
         }
-        let stated = |table: &Option<Bound<'py, PyDict>>, name: &str| -> PyResult<Option<Bound<'py, PyAny>>> {
-            table.as_ref().map_or(Ok(None), |table| table.get_item(name))
-        };
+        let stated =
+            |table: &Option<Bound<'py, PyDict>>, name: &str| -> PyResult<Option<Bound<'py, PyAny>>> {
+                table.as_ref().map_or(Ok(None), |table| table.get_item(name))
+            };
         let numpy = py.import("numpy")?;
         let mut all = Vec::new();
         for (name, samples) in arrays {
@@ -84,7 +84,9 @@ impl<'py> Stated<'py> {
                 Some(unit) => unit.extract()?,
                 None if name == HAMMER && self.force_n.is_some() => "N".to_owned(),
                 None => {
-                    return Err(refused(format!("channel `{name}` has no unit: units={{{name:?}: \"m/s\"}}, or N, g, V …")));
+                    return Err(refused(format!(
+                        "channel `{name}` has no unit: units={{{name:?}: \"m/s\"}}, or N, g, V …"
+                    )));
                 }
             };
             let number = |table, otherwise: f64| -> PyResult<f64> {
@@ -136,7 +138,9 @@ impl Given<'_> {
             .ok_or_else(|| format!("channel `{name}`: unit `{}` is of no use here", self.unit))?;
         let factor = unit.factor * self.scale;
         let hits = self.hits(factor).ok_or_else(|| {
-            format!("channel `{name}`: int16, int32, float32 or float64 with the axes (hit, sample) are needed")
+            format!(
+                "channel `{name}`: int16, int32, float32 or float64 with the axes (hit, sample) are needed"
+            )
         })?;
         // codes keep their type: half their range is the full scale of a converter of 1 V
         let (bits, per_volt) = match hits.first().map(ChannelSamples::view) {
@@ -145,7 +149,9 @@ impl Given<'_> {
             _ => (0, 1.0),
         };
         if !(per_volt as f32).is_normal() {
-            return Err(format!("channel `{name}`: a sample would be {factor} in SI units: state another scale"));
+            return Err(format!(
+                "channel `{name}`: a sample would be {factor} in SI units: state another scale"
+            ));
         }
         // checked by the function that adds the hits
         let late_ns = (1e9 * self.delay_s).round();
@@ -258,7 +264,10 @@ fn only_response(plan: &Plan, configuration: &str, impact: &str) -> Result<Strin
         [] => Err(format!("the plan has no impact `{impact}` in configuration `{configuration}`")),
         [only] => Ok((*only).to_owned()),
         [first, ..] if fixed => Ok((*first).to_owned()),
-        all => Err(format!("several locations were measured from `{impact}`: response= one of {}", all.join(", "))),
+        all => Err(format!(
+            "several locations were measured from `{impact}`: response= one of {}",
+            all.join(", ")
+        )),
     }
 }
 
@@ -325,8 +334,8 @@ pub fn add_level(
 ) -> PyResult<AddedLevel> {
     in_the_process_that_loaded_this(py)?;
     // a level belongs to no response location
-    let (map, all) = together(&plan(py, path)?, "", fs_hz, channels)
-        .map_err(|what| raised::refused(py, &what))?;
+    let (map, all) =
+        together(&plan(py, path)?, "", fs_hz, channels).map_err(|what| raised::refused(py, &what))?;
     let Some(samples) = all.into_iter().next() else {
         return Err(raised::refused(py, "there is no sample: channels need the axis (sample)"));
     };
