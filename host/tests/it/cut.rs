@@ -176,7 +176,8 @@ fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<V
         // a person hits within a millimetre: the shapes vary by 2 %
         let own = shapes[strike.place.unwrap_or(places)]
             .map(|axis| axis.map(|shape| shape * (1.0 + 0.02 * normal())));
-        for scan in from..until {
+        let (force_signal, axes) = all.split_first_mut().expect("four signals");
+        for (scan, value) in force_signal.iter_mut().enumerate().take(until).skip(from) {
             let t = scan as f64 / FS_HZ;
             let force: f64 = pulses
                 .iter()
@@ -184,13 +185,12 @@ fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<V
                 .filter(|(t, _)| (0.0..1.0).contains(t))
                 .map(|(t, peak)| peak * (PI * t).sin())
                 .sum();
-            all[0][scan] += force;
+            *value += force;
             for (mode, pole) in state.iter_mut().zip(poles) {
                 *mode = *mode * pole + force * 1e-5;
             }
-            for (axis, shapes) in own.iter().enumerate() {
-                all[axis + 1][scan] +=
-                    shapes.iter().zip(&state).map(|(shape, mode)| shape * mode.re).sum::<f64>();
+            for (axis, shapes) in axes.iter_mut().zip(&own) {
+                axis[scan] += shapes.iter().zip(&state).map(|(shape, mode)| shape * mode.re).sum::<f64>();
             }
         }
     }
