@@ -63,6 +63,7 @@ pub trait Scanned {
     fn code(&self, scan: usize, channel: usize) -> i16;
 }
 
+#[allow(clippy::large_enum_variant, reason = "there is no heap; it is large only on a PC, with 64 channels")]
 enum State {
     Disarmed,
     Armed { until: u64 },
