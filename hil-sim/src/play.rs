@@ -92,7 +92,8 @@ pub fn play(config: &RigConfig, play: &Play, mut to: impl Write) -> Result<(), P
     let mut rig = Rig::new(config, play.seed)?;
     let channels = describe(rig.channels());
     let rate_hz = f64::from(rig.scan_rate_hz());
-    // until shortly before the next hit would follow, so that a long record of the last one is whole
+    // until shortly before the next hit would follow, so that a long record of the last one is
+    // whole
     let stay = ((f64::from(play.hits) + 0.9) * every_s * rate_hz) as u64;
     let mut blocks = Blocks { play, rate_hz, scans: 0, begun: Instant::now(), bytes: Vec::new() };
     let outcome = (|| {

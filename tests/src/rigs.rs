@@ -149,7 +149,8 @@ fn with_accelerometers(rig: RigConfig, errors: f64) -> RigConfig {
 /// The rig without lasers.
 const ACCELEROMETERS: &str = include_str!("../../hil-sim/rigs/accelerometers.toml");
 
-/// The plan for such a rig: `contact-by-hand.toml` with the known standard deviations of its errors.
+/// The plan for such a rig: `contact-by-hand.toml` with the known standard deviations of its
+/// errors.
 pub fn by_hand_plan(rig: &RigConfig) -> String {
     let (head, tail) = CONTACT_BY_HAND.split_once("\n# Standard deviations of what is not known").unwrap();
     let (_, tail) = tail.split_once("\n# B alone").unwrap();

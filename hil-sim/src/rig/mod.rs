@@ -291,9 +291,9 @@ impl Rig {
         Ok(())
     }
 
-    /// Advances exactly one scan period and samples: one 16-bit word per channel, in order, then the
-    /// lower words of wide codes ([`jointrig_protocol::block`]). A shorter slice receives the first
-    /// words; the end of a longer one is unchanged.
+    /// Advances exactly one scan period and samples: one 16-bit word per channel, in order, then
+    /// the lower words of wide codes ([`jointrig_protocol::block`]). A shorter slice receives the
+    /// first words; the end of a longer one is unchanged.
     pub fn scan(&mut self, codes: &mut [i16]) {
         let Some(mut connected) = self.connected.take() else { return self.scan_all(codes) };
         self.scan_all(&mut connected.codes);

@@ -2,17 +2,17 @@
 //!
 //! code = round(volts / range · 2^(bits-1)), saturating, volts = (delayed signal · polarity +
 //! noise) / scale; the codes of all channels have 16 bits, or all are wide
-//! ([`jointrig_protocol::block`]). A delay has whole scans and a fraction of one. Noise is drawn for every channel in every
-//! scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain
-//! and skew ([`Flaws`]) are applied before the noise. The errors of a campaign's instruments, also
-//! the true positions of the spots, are keyed to (seed, purpose): the same in every cell and
-//! configuration, whatever was visited before.
+//! ([`jointrig_protocol::block`]). A delay has whole scans and a fraction of one. Noise is drawn
+//! for every channel in every scan, present or not, so that a channel's stream does not depend on
+//! the others. Cross-talk, gain and skew ([`Flaws`]) are applied before the noise. The errors of a
+//! campaign's instruments, also the true positions of the spots, are keyed to (seed, purpose): the
+//! same in every cell and configuration, whatever was visited before.
 //!
 //! Fixed sensors (vibrometers, accelerometers) stay at one point while the hammer moves; each has
 //! its own channel after the ten. Their errors are of the same kinds as those of the vibrometers:
 //! true position (keyed to the response point as for the 3-D vibrometer, but without the aiming
-//! error), gain, skew and noise, and a sensitivity to motion across their direction. Their noise has
-//! a separate stream, so that they do not change the ten channels.
+//! error), gain, skew and noise, and a sensitivity to motion across their direction. Their noise
+//! has a separate stream, so that they do not change the ten channels.
 //!
 //! An accelerometer's signal is c (A x + b f), with the row c of its velocity: it contains the
 //! forces of the same moment directly.
@@ -330,8 +330,8 @@ fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
     config.sensors.fixed.iter().filter_map(one).collect()
 }
 
-/// The direction of a fixed sensor with its drawn sensitivities across it: its reading is the motion
-/// along this vector, whose length is not one.
+/// The direction of a fixed sensor with its drawn sensitivities across it: its reading is the
+/// motion along this vector, whose length is not one.
 fn sensitive(own: &FixedSensor, transverse: f64, seed: u64) -> [f64; 3] {
     let direction = normalized(own.direction);
     if transverse == 0.0 {

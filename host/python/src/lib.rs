@@ -2,8 +2,8 @@
 //! possible here.
 //!
 //! All work runs with the interpreter released. Returned arrays are the memory that Rust filled,
-//! without a copy; an input signal is read once. Hits and levels are added to a campaign file by the
-//! same functions as the command's. No device can be opened: only the command moves a hammer.
+//! without a copy; an input signal is read once. Hits and levels are added to a campaign file by
+//! the same functions as the command's. No device can be opened: only the command moves a hammer.
 
 #![allow(clippy::needless_pass_by_value, reason = "Python hands arguments over by value")]
 

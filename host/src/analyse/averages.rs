@@ -28,8 +28,8 @@ pub struct CellAverage {
     pub step_hz: f64,
     /// v_A, v_B and T at the contact, if requested and measured.
     pub contact: Option<CrossSpectra>,
-    /// The response, v_A and v_B if measured, and T, with the heavy damping used for the contact, if
-    /// requested and measured.
+    /// The response, v_A and v_B if measured, and T, with the heavy damping used for the contact,
+    /// if requested and measured.
     pub damped: Option<CrossSpectra>,
     /// As `damped` but with the plan's light damping, used to correct the shaker's levels.
     pub light: Option<CrossSpectra>,

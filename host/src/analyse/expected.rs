@@ -145,7 +145,8 @@ struct Simulation<'a> {
 type Hits = Vec<Vec<Complex<f64>>>;
 
 impl Simulation<'_> {
-    /// Hits one impact and adds the cells that the estimator reads; `None` if a point is on no body.
+    /// Hits one impact and adds the cells that the estimator reads; `None` if a point is on no
+    /// body.
     fn strike(&mut self, of: Structure, impact: &Point) -> Option<()> {
         let (plan, rig) = (self.plan, self.rig);
         let own = |cell: &&crate::campaign::plan::Cell| {
@@ -301,11 +302,13 @@ mod tests {
 
     #[test]
     fn the_interval_to_expect_is_what_campaigns_have() {
-        // docs/accuracy.md: 3 % with lasers; a campaign on the default rig has 7.6 % with accelerometers
+        // docs/accuracy.md: 3 % with lasers; a campaign on the default rig has 7.6 % with
+        // accelerometers
         let (lasers, accelerometers) = (half(CONTACT), half(CONTACT_BY_HAND));
         assert!((0.015..0.06).contains(&lasers), "{lasers}");
         assert!((0.05..0.11).contains(&accelerometers), "{accelerometers}");
-        // more hits leave less noise, and worse positions widen it, although the signals correct them
+        // more hits leave less noise, and worse positions widen it, although the signals correct
+        // them
         let more = CONTACT_BY_HAND.replace("wanted = 10", "wanted = 25");
         assert!(half(&more) < 0.9 * accelerometers);
         let worse = CONTACT_BY_HAND.replace("sigma_m = 2e-4", "sigma_m = 1e-3");

@@ -144,8 +144,8 @@ impl ChannelSamples {
     /// first value that no sample of this type has.
     ///
     /// A value is a sample times `units`, rounded to double precision. Division gives the sample
-    /// back but for the last digits: a code is the nearest whole number, and a floating-point sample
-    /// is looked for among its neighbours until its product is the value.
+    /// back but for the last digits: a code is the nearest whole number, and a floating-point
+    /// sample is looked for among its neighbours until its product is the value.
     ///
     /// # Errors
     /// The index of that value.

@@ -4,9 +4,9 @@
 //! names the missing scans, so that the session can request them; scans that the device reports as
 //! lost for good are recorded as a lost range, and the stream continues after it.
 //!
-//! Up to here 16-bit words are kept one scan after another, as the link delivers them. [`Stream::cut`] takes
-//! a part of the stream out of it one channel after another, as everything above uses it; a
-//! [`Recording`] is the part around one impact.
+//! Up to here 16-bit words are kept one scan after another, as the link delivers them.
+//! [`Stream::cut`] takes a part of the stream out of it one channel after another, as everything
+//! above uses it; a [`Recording`] is the part around one impact.
 
 use super::channels::ChannelMap;
 use super::samples::{ChannelSamples, ChannelView, Samples};
@@ -81,8 +81,8 @@ impl ScanLayout {
         self.words
     }
 
-    /// `scans` samples of each channel, of which those from `at` on are in `words` (whole scans, one
-    /// after another) and the others are 0.
+    /// `scans` samples of each channel, of which those from `at` on are in `words` (whole scans,
+    /// one after another) and the others are 0.
     pub fn samples(&self, scans: usize, at: usize, words: &[i16]) -> Samples {
         let mut lower = self.bits.len()..;
         let mut of = |(place, bits): (usize, &u8)| {

@@ -138,8 +138,8 @@ pub fn tap() -> (Tap, View) {
 }
 
 impl Tap {
-    /// Begins a new stream at `first_scan`, whose scans have `words` 16-bit words, first one of each
-    /// channel; an incomplete envelope is discarded.
+    /// Begins a new stream at `first_scan`, whose scans have `words` 16-bit words, first one of
+    /// each channel; an incomplete envelope is discarded.
     pub fn begin(&mut self, channels: usize, words: usize, first_scan: u64, rate_hz: f64) {
         let channels = channels.min(CHANNEL_CAPACITY);
         self.words = words.max(1);
@@ -152,8 +152,8 @@ impl Tap {
         (self.open, self.over) = ([NOTHING; CHANNEL_CAPACITY], 0);
     }
 
-    /// Adds the next scans; `codes` holds the words of one scan after another. Of a wide channel the
-    /// upper 16 bits are shown.
+    /// Adds the next scans; `codes` holds the words of one scan after another. Of a wide channel
+    /// the upper 16 bits are shown.
     pub fn fold(&mut self, mut codes: &[i16]) {
         let channels = self.making.channels;
         if channels == 0 {

@@ -1,4 +1,5 @@
-//! Arrays of npz files that are too long for memory: read in pieces, as the bytes of their own type.
+//! Arrays of npz files that are too long for memory: read in pieces, as the bytes of their own
+//! type.
 //!
 //! numpy.savez stores arrays uncompressed, so any part of them can be read where it lies in the
 //! file. The checksum of such an array is verified once, when it is opened. A compressed array

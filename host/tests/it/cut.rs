@@ -155,7 +155,8 @@ impl Person {
 fn signals(strikes: &[Strike], places: usize, length_s: f64, seed: u64) -> Vec<Vec<f32>> {
     let mut dice = Xoshiro256PlusPlus::seed_from_u64(seed);
     let scans = (length_s * FS_HZ) as usize;
-    // products of the shapes at hammer and sensor, for each place, axis and mode; the last is elsewhere
+    // products of the shapes at hammer and sensor, for each place, axis and mode; the last is
+    // elsewhere
     let mut normal = || -> f64 { StandardNormal.sample(&mut dice) };
     let shapes: Vec<[[f64; 5]; 3]> = (0..=places).map(|_| [0; 3].map(|_| [0; 5].map(|_| normal()))).collect();
     let mut all = vec![vec![0.0; scans]; 4];
@@ -248,8 +249,8 @@ fn place(number: usize, responses: usize) -> (String, String) {
     (format!("H{}", impact + 1), format!("S{}", response + 1))
 }
 
-/// Compares what a campaign holds with where its hits were struck; returns the number of records and
-/// of good ones.
+/// Compares what a campaign holds with where its hits were struck; returns the number of records
+/// and of good ones.
 fn check(file: &Path, strikes: &[Strike], responses: usize) -> [usize; 2] {
     let store = Store::open_read_only(file).expect("a campaign");
     let cells = store.cells().expect("cells");

@@ -351,8 +351,8 @@ fn the_example_in_c_is_a_recorder() {
     assert!(gaps.is_empty());
     let force_n = map.to_si(0, samples.channel(0));
     let (at, peak) = force_n.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
-    // the middle of a millisecond after half a second lies 0.2 scans earlier, where the force is 15 mN
-    // larger; a code is 6 mN
+    // the middle of a millisecond after half a second lies 0.2 scans earlier, where the force is 15
+    // mN larger; a code is 6 mN
     assert_eq!(at, 12_813);
     assert!((peak - 49.985).abs() < 0.01, "{peak}");
     let peak = map.to_si(1, samples.channel(1)).into_iter().fold(0.0, f64::max);

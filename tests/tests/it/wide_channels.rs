@@ -27,8 +27,8 @@ fn rig(bits: u8, noise_db: f64, m_per_s_per_v: f64) -> String {
     text
 }
 
-/// Relative error (rms) of the receptance of A at its lines 90 to 110 dB below the largest one, from
-/// the second hit of a campaign on this rig, and the type of its samples.
+/// Relative error (rms) of the receptance of A at its lines 90 to 110 dB below the largest one,
+/// from the second hit of a campaign on this rig, and the type of its samples.
 fn error_far_below_the_peak(rig: &str) -> (f64, SampleType) {
     let config = RigConfig::from_toml(rig).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -92,8 +92,8 @@ fn a_range_that_is_too_large_costs_little_with_24_bits() {
     assert!(narrow > 0.2, "{narrow}, and {wide} with 24 bits");
 }
 
-/// The codes in the file are those of the converter: the same rig with 30 bits gives, rounded to 24,
-/// the same codes.
+/// The codes in the file are those of the converter: the same rig with 30 bits gives, rounded to
+/// 24, the same codes.
 #[test]
 fn wide_codes_arrive_without_a_loss() {
     let measured = |bits: u8| {

@@ -4,9 +4,9 @@
 //!
 //! A point is either visited by the 3-D vibrometer or has a fixed sensor, for example a triaxial
 //! accelerometer. The vibrometer's axes have one gain and delay each, whatever the point; a fixed
-//! sensor has its own, and its axes may be tilted. Fixed sensors measure every hit at the same time,
-//! so that several cells have the same hits: the signals that all cells contain (T and the spots)
-//! count in the first of them only.
+//! sensor has its own, and its axes may be tilted. Fixed sensors measure every hit at the same
+//! time, so that several cells have the same hits: the signals that all cells contain (T and the
+//! spots) count in the first of them only.
 
 use super::parameters::{Cause, DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
 use super::{ContactError, ContactPriors, Input};
@@ -242,8 +242,8 @@ fn perpendicular(direction: [f64; 3]) -> [[f64; 3]; 2] {
     [first.into(), own.cross(&first).into()]
 }
 
-/// Smallest eigenvalue of a body's normalised 6 × 6 matrix of sensors relative to the largest: below
-/// this, the sensors leave one motion of the body undetermined.
+/// Smallest eigenvalue of a body's normalised 6 × 6 matrix of sensors relative to the largest:
+/// below this, the sensors leave one motion of the body undetermined.
 const DETERMINED: f64 = 2e-3;
 
 /// Whether sensors with these positions and unit directions determine all six motions of a rigid
@@ -543,8 +543,8 @@ pub const SIGMA_PER_S: f64 = 50.0;
 /// Index of a point's first axis among a cell's channels, after T, spot B and spot A.
 pub(super) const POINT: usize = 3;
 
-/// A cell's values, per newton of the hammer: motion as displacement (m/N), force in N/N; by channel
-/// (T, spot B, spot A, then the point's axes). Those of absent spots are not numbers.
+/// A cell's values, per newton of the hammer: motion as displacement (m/N), force in N/N; by
+/// channel (T, spot B, spot A, then the point's axes). Those of absent spots are not numbers.
 #[derive(Debug, Clone)]
 pub(super) struct CellValues {
     /// By line and channel.

@@ -120,7 +120,8 @@ pub struct Interval {
     pub ci95: [f64; 2],
 }
 
-/// A relative share of the uncertainty below this is rounding: the cause does not affect the signals.
+/// A relative share of the uncertainty below this is rounding: the cause does not affect the
+/// signals.
 const ROUNDING: f64 = 1e-9;
 
 /// Variances by cause, in the squared unit of the uncertain quantity; they add up.

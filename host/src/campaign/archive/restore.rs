@@ -1,9 +1,10 @@
 //! A campaign file from a folder that `jointrig export` wrote with its document.
 //!
-//! Everything is checked before the campaign file is made. Records get their exported verdicts,
-//! and their samples in the types in which they were measured; the caller judges them again
-//! ([`recheck`](crate::campaign::recheck::recheck)) and reports the differences. What is in the file already is not
-//! stored again, so that an interrupted import is continued by the same command.
+//! Everything is checked before the campaign file is made. Records get their exported verdicts, and
+//! their samples in the types in which they were measured; the caller judges them again
+//! ([`recheck`](crate::campaign::recheck::recheck)) and reports the differences. What is in the
+//! file already is not stored again, so that an interrupted import is continued by the same
+//! command.
 
 use std::collections::{HashMap, HashSet};
 use std::io;

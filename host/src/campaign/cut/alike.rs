@@ -1,10 +1,10 @@
-//! How much the structure's answer differs between two hits: the evidence that they were at the same
-//! place.
+//! How much the structure's answer differs between two hits: the evidence that they were at the
+//! same place.
 //!
 //! At one place, response over force is the same for every hit, however hard it was, and also for a
 //! double hit, whose second pulse is in the force as well. At another place of hammer or sensor it
-//! is not. [`Answers`] computes the ratio of the spectra of each hit on lines of a common band, with
-//! its variance by the noise that was recorded before the hit. Both signals have the same
+//! is not. [`Answers`] computes the ratio of the spectra of each hit on lines of a common band,
+//! with its variance by the noise that was recorded before the hit. Both signals have the same
 //! exponential window, which keeps the ratio exact (it becomes the FRF at s = σ + iω) and makes it
 //! smooth, so that few lines describe it.
 
@@ -12,7 +12,8 @@ use num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 use std::sync::Arc;
 
-/// Decay of the window over the compared length, in time constants: what follows is cut off at e⁻¹².
+/// Decay of the window over the compared length, in time constants: what follows is cut off at
+/// e⁻¹².
 const DECAY: f64 = 12.0;
 /// Most lines that are compared.
 const LINES: usize = 160;
@@ -40,8 +41,8 @@ pub struct AnswerLine {
 pub struct Answer(pub Vec<AnswerLine>);
 
 impl Answer {
-    /// The relative difference of two answers: near 0 for hits at one place, near 1 for answers that
-    /// have nothing in common. `None` where noise hides them.
+    /// The relative difference of two answers: near 0 for hits at one place, near 1 for answers
+    /// that have nothing in common. `None` where noise hides them.
     pub fn difference(&self, other: &Answer) -> Option<f64> {
         let (mut sum, mut lines) = (0.0, 0_usize);
         for (one, other) in self.0.iter().zip(&other.0) {

@@ -1,11 +1,12 @@
-//! Finds the steady parts of a shaker's recording: one part for each level, without the transitions.
+//! Finds the steady parts of a shaker's recording: one part for each level, without the
+//! transitions.
 //!
 //! The reference channel (the excitation's force or a specimen's velocity) is divided into blocks.
 //! In each, the strongest line of the spectrum gives a first value of the frequency and the
-//! amplitude; the advance of its phase from block to block gives the frequency a thousand times more
-//! exactly. A part is steady as long as the amplitude stays within a tolerance of the part's first
-//! block and the phase advances evenly. Its first and last blocks are left out, because they may
-//! contain the end of a transition.
+//! amplitude; the advance of its phase from block to block gives the frequency a thousand times
+//! more exactly. A part is steady as long as the amplitude stays within a tolerance of the part's
+//! first block and the phase advances evenly. Its first and last blocks are left out, because they
+//! may contain the end of a transition.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -115,7 +116,8 @@ impl SteadyFinder {
         if own <= DOMINANT * power.iter().sum::<f64>() {
             return None;
         }
-        // of a sine between two lines, a Hann window gives neighbours whose ratio is (1 + d)/(2 - d)
+        // of a sine between two lines, a Hann window gives neighbours whose ratio is (1 + d)/(2 -
+        // d)
         let (low, high) = (power[top - 1].sqrt(), power[top + 1].sqrt());
         let (side, sign) = if high > low { (high, 1.0) } else { (low, -1.0) };
         let ratio = side / power[top].sqrt();
@@ -191,8 +193,8 @@ mod tests {
 
     const FS_HZ: f64 = 5120.0;
 
-    /// Levels (frequency, amplitude, s), with ramps of the amplitude of half a second before each, noise
-    /// and offset.
+    /// Levels (frequency, amplitude, s), with ramps of the amplitude of half a second before each,
+    /// noise and offset.
     fn signal(levels: &[(f64, f64, f64)]) -> Vec<f64> {
         let mut dice = Xoshiro256PlusPlus::seed_from_u64(4);
         let mut out = Vec::new();

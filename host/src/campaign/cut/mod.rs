@@ -9,9 +9,10 @@
 //! | what the user states about the places | [`stated`] |
 //! | steady parts of a shaker's recording | [`levels`] |
 //!
-//! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns the
-//! samples of one as a record of the plan's length, which `campaign::import` stores. The recording
-//! is read in pieces: memory is needed for one record at a time, whatever the recording's length.
+//! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns
+//! the samples of one as a record of the plan's length, which `campaign::import` stores. The
+//! recording is read in pieces: memory is needed for one record at a time, whatever the recording's
+//! length.
 
 pub mod alike;
 pub mod hits;

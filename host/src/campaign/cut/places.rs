@@ -1,9 +1,10 @@
-//! Which place of the plan each hit was at: hits are fitted to the plan's order, and where more than
-//! one reading is possible, the answer is a list of questions instead of a guess.
+//! Which place of the plan each hit was at: hits are fitted to the plan's order, and where more
+//! than one reading is possible, the answer is a list of questions instead of a guess.
 //!
 //! The evidence is the structure's answer ([`Answer::difference`]). Good hits whose answers agree
 //! are one *group*: one place, however often and in how many visits it was struck. The plan states
-//! the order in which places were first struck. The fit is accepted only if this leaves one reading:
+//! the order in which places were first struck. The fit is accepted only if this leaves one
+//! reading:
 //!
 //! - as many groups of enough hits as the plan has places, between any two places that are known
 //!   (from the user's table);
@@ -33,7 +34,8 @@ const MOST_SAME: f64 = 0.5;
 /// A difference below this is not compared with smaller ones: exact repetition says nothing about
 /// the next one.
 const SMALLEST: f64 = 0.02;
-/// The hits of a group that a further hit is compared with: the last ones, because structures drift.
+/// The hits of a group that a further hit is compared with: the last ones, because structures
+/// drift.
 const COMPARED: usize = 4;
 /// A first group of at most this many good hits, if fewer than wanted, may be test taps.
 const MOST_TAPS: usize = 3;

@@ -235,7 +235,8 @@ fn drawn_sessions_are_fitted_without_a_wrong_place() {
     let ([fitted, asked, left, hits], wrong) = drawn(0, &USUAL);
     println!("usual: {fitted} fitted, {asked} asked, {left} of {hits} hits left out, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{} wrong: {:#?}", wrong.len(), &wrong[..wrong.len().min(20)]);
-    // questions arise where two hits are wanted and one is missing: hits beside the point look alike
+    // questions arise where two hits are wanted and one is missing: hits beside the point look
+    // alike
     assert!(asked * 2 < fitted, "{asked} asked, {fitted} fitted");
     // good hits are rarely left out
     assert!(left * 100 < hits, "{left} of {hits}");

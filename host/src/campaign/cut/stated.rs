@@ -1,5 +1,5 @@
-//! What the user states about the places of hits: a table, for sessions that deviate from the plan's
-//! order in a way that the recording does not show.
+//! What the user states about the places of hits: a table, for sessions that deviate from the
+//! plan's order in a way that the recording does not show.
 
 use serde::Deserialize;
 

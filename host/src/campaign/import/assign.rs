@@ -134,7 +134,8 @@ struct Kept {
     factor: f64,
 }
 
-/// The channels of a file as those of hits at `response`, and the samples of each hit in that order.
+/// The channels of a file as those of hits at `response`, and the samples of each hit in that
+/// order.
 ///
 /// A value with a unit of force or motion is stored in SI units; a value in volts, or in parts of a
 /// recorder's full scale, is stored as it came, with the sensor's scale.
@@ -272,8 +273,8 @@ fn described(
     }))
 }
 
-/// Quantity, units per volt and delay of a channel whose sensor the plan describes. The plan does not
-/// state the quantity: it is known of hammer, load cells, shaker and vibrometers.
+/// Quantity, units per volt and delay of a channel whose sensor the plan describes. The plan does
+/// not state the quantity: it is known of hammer, load cells, shaker and vibrometers.
 fn from_plan(name: &str, planned: Option<&SensorPlan>) -> Option<(Quantity, f64, Option<f64>)> {
     let sensor = planned?;
     let sensitivity_v = sensor.sensitivity_v?;

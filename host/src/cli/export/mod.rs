@@ -43,9 +43,10 @@ mod tables;
 /// its original and current verdict, when and why it was overruled, and its place in these files;
 /// DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
 /// level of the shaker (velocities of both specimens and the load cells' sum, aligned in time; npz
-/// as `jointrig hysteresis` reads it), one with all its channels, and levels.csv with ordered and reached amplitudes.
-/// DIR/results.json and report.html. DIR/plan.toml and archive.json: the plan, and everything else
-/// of the file, with which `jointrig import DIR --into NEW.jrig` makes the same campaign again.
+/// as `jointrig hysteresis` reads it), one with all its channels, and levels.csv with ordered and
+/// reached amplitudes. DIR/results.json and report.html. DIR/plan.toml and archive.json: the plan,
+/// and everything else of the file, with which `jointrig import DIR --into NEW.jrig` makes the same
+/// campaign again.
 ///
 /// --format parquet: columns for engines such as DuckDB, Polars and Spark. The tables are Parquet
 /// files, frf.parquet has one row for each line, estimates.parquet one for each stiffness, and the

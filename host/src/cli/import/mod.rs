@@ -39,8 +39,8 @@ use folder::Wishes;
 /// one.
 ///
 /// A folder that `jointrig export` wrote is imported as a whole with --into alone: plan, sessions,
-/// records with all channels and verdicts, levels, calibrations, notes. The campaign file is made if
-/// it does not exist, and its analysis gives the same results.
+/// records with all channels and verdicts, levels, calibrations, notes. The campaign file is made
+/// if it does not exist, and its analysis gives the same results.
 ///
 /// Any other folder is imported into a campaign file with --into alone: files named
 /// CONFIGURATION_IMPACT_RESPONSE are cells, files named CONFIGURATION contain FRFs, and universal
