@@ -24,6 +24,16 @@ use std::path::PathBuf;
 /// The default band of FRF lines, Hz.
 const BAND_HZ: (f64, f64) = (10.0, 1000.0);
 
+/// A new campaign file for the plan in `plan`.
+#[pyfunction]
+pub fn new(py: Python<'_>, path: PathBuf, plan: PathBuf) -> PyResult<Lab> {
+    let text = std::fs::read_to_string(&plan)
+        .map_err(|error| raised::reading(py, &plan, &format!("{}: {error}", plan.display())))?;
+    py.detach(|| Store::create(&path, &text, &plan.display().to_string())?.close())
+        .map_err(|error| raised::file(py, &path, &error))?;
+    Ok(Lab::at(path))
+}
+
 /// A campaign file, opened read only for each request, so that it may be measured at the same time;
 /// adding hits and levels opens it for writing. Holds a path and no connection,
 /// so that it can be pickled.

@@ -49,7 +49,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<record::Record>()?;
     module.add_class::<frf::Frf>()?;
     module.add_class::<lab::Analysis>()?;
-    module.add_function(wrap_pyfunction!(writing::new, module)?)?;
+    module.add_function(wrap_pyfunction!(lab::new, module)?)?;
     module.add_function(wrap_pyfunction!(signals::frf, module)?)?;
     module.add_function(wrap_pyfunction!(signals::identify, module)?)?;
     module.add_function(wrap_pyfunction!(signals::hysteresis, module)?)?;

@@ -1,7 +1,6 @@
 //! Writing: a new campaign file, and hits and levels from arrays, judged and stored by the same
 //! functions as the command's import.
 
-use crate::lab::Lab;
 use crate::{in_the_process_that_loaded_this, raised};
 use jointrig::campaign::import::roles::role_of;
 use jointrig::campaign::import::{
@@ -18,17 +17,7 @@ use jointrig_protocol::channel::{Channel, Quantity, Role};
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::{Path, PathBuf};
-
-/// A new campaign file for the plan in `plan`.
-#[pyfunction]
-pub fn new(py: Python<'_>, path: PathBuf, plan: PathBuf) -> PyResult<Lab> {
-    let text = std::fs::read_to_string(&plan)
-        .map_err(|error| raised::reading(py, &plan, &format!("{}: {error}", plan.display())))?;
-    py.detach(|| Store::create(&path, &text, &plan.display().to_string())?.close())
-        .map_err(|error| raised::file(py, &path, &error))?;
-    Ok(Lab::at(path))
-}
+use std::path::Path;
 
 /// One channel of hits or of a level, as Python describes it.
 pub struct Given<'py> {

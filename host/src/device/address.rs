@@ -130,7 +130,11 @@ impl Address {
 
 #[cfg(feature = "bridge")]
 fn open_bridge(source: &BridgeSource) -> Result<Box<dyn Transport>, DeviceError> {
-    Ok(Box::new(super::bridge::BridgedRecorder::open(source)?))
+    use super::bridge::BridgedRecorder;
+    Ok(Box::new(match source {
+        BridgeSource::Command(command) => BridgedRecorder::start(command)?,
+        BridgeSource::Tcp(place) => BridgedRecorder::connect(place)?,
+    }))
 }
 
 #[cfg(not(feature = "bridge"))]

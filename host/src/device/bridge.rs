@@ -4,7 +4,6 @@
 //! closed, and if it has not ended two seconds later it is killed. What it prints to standard error
 //! is logged; its last line is a part of the error when it ends.
 
-use super::address::BridgeSource;
 use super::error::DeviceError;
 use super::tcp;
 use super::transport::{Recorder, Transport};
@@ -116,7 +115,7 @@ impl Program {
     }
 
     /// How it ended, and its last line on standard error.
-    fn epitaph(&mut self) -> String {
+    fn how_it_ended(&mut self) -> String {
         let how = match self.status(STATUS_PATIENCE) {
             Some(status) => format!("the program ended ({status})"),
             None => "the program runs on without writing".into(),
@@ -167,40 +166,42 @@ fn listen(mut lines: impl BufRead, last: &Mutex<String>) {
 }
 
 impl BridgedRecorder {
-    /// Starts the program, or connects to it, and reads its header.
+    /// Starts a program with this command line, and reads the header that it writes.
     ///
     /// # Errors
     /// [`DeviceError::Open`] with the cause, and how the program ended.
-    pub fn open(from: &BridgeSource) -> Result<Self, DeviceError> {
-        let address = || match from {
-            BridgeSource::Command(command) => format!("bridge:{command}"),
-            BridgeSource::Tcp(place) => format!("bridge:tcp:{place}"),
-        };
-        let open = |why: String| DeviceError::Open { address: address(), why };
-        let (mut source, opened) = match from {
-            BridgeSource::Command(command) => {
-                let (program, output) = Program::start(command).map_err(open)?;
-                (Source::Program(program), Bridge::open(output, HEADER_PATIENCE))
-            }
-            BridgeSource::Tcp(place) => {
-                let connected = tcp::connect(place).and_then(|stream| {
-                    stream.try_clone().map(|own| (own, stream)).map_err(|error| error.to_string())
-                });
-                let (stream, output) = connected
-                    .map_err(|why| open(format!("{why}: does the recorder's program listen there?")))?;
-                (Source::Socket(stream), Bridge::open(output, HEADER_PATIENCE))
-            }
-        };
+    pub fn start(command: &str) -> Result<Self, DeviceError> {
+        let open = |why: String| DeviceError::Open { address: format!("bridge:{command}"), why };
+        let (program, output) = Program::start(command).map_err(open)?;
+        Self::of(Source::Program(program), Bridge::open(output, HEADER_PATIENCE)).map_err(open)
+    }
+
+    /// Connects to a program at `host:port`, and reads the header that it sends.
+    ///
+    /// # Errors
+    /// [`DeviceError::Open`] with the cause.
+    pub fn connect(place: &str) -> Result<Self, DeviceError> {
+        let open = |why: String| DeviceError::Open { address: format!("bridge:tcp:{place}"), why };
+        let connected = tcp::connect(place).and_then(|stream| {
+            stream.try_clone().map(|own| (own, stream)).map_err(|error| error.to_string())
+        });
+        let (stream, output) =
+            connected.map_err(|why| open(format!("{why}: does the recorder's program listen there?")))?;
+        Self::of(Source::Socket(stream), Bridge::open(output, HEADER_PATIENCE)).map_err(open)
+    }
+
+    /// The recorder behind a source whose header was read, or why it cannot be used.
+    fn of(mut source: Source, opened: Result<(Bridge, HostEnd), OpenError>) -> Result<Self, String> {
         match opened {
             Ok((device, link)) => Ok(Self { link, source, device }),
             Err(error) => {
                 let why = match (&error, &mut source) {
                     (OpenError::Header(_), Source::Program(program)) => {
-                        format!("{error}; {}", program.epitaph())
+                        format!("{error}; {}", program.how_it_ended())
                     }
                     _ => error.to_string(),
                 };
-                Err(open(format!("{why} (the format is described in docs/bridge.md)")))
+                Err(format!("{why} (the format is described in docs/bridge.md)"))
             }
         }
     }
@@ -209,7 +210,7 @@ impl BridgedRecorder {
     fn explained(&mut self, error: io::Error) -> io::Error {
         let Some(why) = self.device.ended() else { return error };
         let why = match &mut self.source {
-            Source::Program(program) => format!("{why}; {}", program.epitaph()),
+            Source::Program(program) => format!("{why}; {}", program.how_it_ended()),
             Source::Socket(_) => why,
         };
         io::Error::new(error.kind(), why)
