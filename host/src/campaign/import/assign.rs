@@ -3,7 +3,7 @@
 
 use std::str::FromStr;
 
-use jointrig_protocol::channel::{Channel, Quantity};
+use jointrig_protocol::channel::{Channel, Quantity, Role};
 
 use super::channel_file::{ChannelFile, FULL_SCALE, FileChannel};
 use super::roles::{role_of, same_name};
@@ -124,6 +124,17 @@ fn sensitivity(text: &str) -> Result<StatedScale, String> {
     let volts = volts(below).ok_or_else(form)?;
     let (quantity, factor) = measured_in(above).map_err(|what| format!("`{above}`: {what}"))?;
     Ok(StatedScale { per_volt: value * factor / volts, quantity })
+}
+
+/// Whether a file names channels other than the force and the responses of a location: specimens,
+/// load cells, the shaker's force.
+pub fn names_the_contact(plan: &Plan, file: &ChannelFile) -> bool {
+    let of_contact = |channel: &FileChannel| {
+        let role = |quantity| role_of(plan, "", &channel.name, quantity);
+        matches!(role(Quantity::Force), Some(Role::LoadCell | Role::Excitation))
+            || matches!(role(Quantity::Velocity), Some(Role::SpecimenA | Role::SpecimenB))
+    };
+    file.channels.iter().any(of_contact)
 }
 
 /// A channel that is kept: its place in the file, its description, and the factor of its values.
@@ -294,7 +305,6 @@ fn from_plan(name: &str, planned: Option<&SensorPlan>) -> Option<(Quantity, f64,
 mod tests {
     use super::*;
     use crate::campaign::plan::CONTACT;
-    use jointrig_protocol::channel::Role;
 
     fn file(channels: &[(&str, Option<&str>)]) -> ChannelFile {
         let describe = |(name, unit): &(&str, Option<&str>)| FileChannel {
