@@ -98,7 +98,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
             "{}: {} hits in {} cells, {} of them good{there}",
             into.display(),
             all.hits,
-            all.cells,
+            all.cells.len(),
             all.kept
         ));
         lines.extend(length);

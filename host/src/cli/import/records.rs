@@ -1,5 +1,6 @@
 //! Imports impact records into one cell of a campaign file.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use toml::Spanned;
@@ -33,7 +34,8 @@ pub(super) fn origin_of(path: &Path, name: &str) -> Result<Origin, CliError> {
 /// Result of an import of records.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Brought {
-    pub(super) cells: usize,
+    /// The cells that have hits of it.
+    pub(super) cells: BTreeSet<i64>,
     pub(super) hits: usize,
     pub(super) kept: usize,
     /// Hits that were already stored by an earlier import of the same file.
@@ -46,7 +48,7 @@ pub(super) struct Brought {
 
 impl Brought {
     pub(super) fn add(&mut self, other: &Brought) {
-        self.cells += other.cells;
+        self.cells.extend(&other.cells);
         self.hits += other.hits;
         self.kept += other.kept;
         self.already += other.already;
@@ -119,7 +121,7 @@ pub(super) fn bring(
     tell: &mut dyn FnMut(u32, &Judgement),
 ) -> Result<Brought, CliError> {
     let plan = store.plan()?;
-    let (_, cell, _) = find(store, name)?;
+    let (id, cell, _) = find(store, name)?;
     let wrong = |reason: String| bad(format!("{}: {reason}", origin.name));
     let (read, axes) = along_plan(&plan, &cell, read).map_err(wrong)?;
     let RecordFile { records, delay_s, taken, .. } = read;
@@ -127,7 +129,7 @@ pub(super) fn bring(
     put_in_step(&mut map, &delay_s);
     let hits = (0..).zip(samples).map(|(number, samples)| Hit::new(number, samples)).collect();
     let Added { hits, kept, already, types } = add_hits(store, origin, name, &map, hits, replace, tell)?;
-    Ok(Brought { cells: 1, hits, kept, already, types, taken })
+    Ok(Brought { cells: BTreeSet::from([id]), hits, kept, already, types, taken })
 }
 
 /// Whether a file is read with all its channels: named ones, or a universal file of which
@@ -170,7 +172,7 @@ pub(super) fn bring_channels(
     let taken = taken.collect::<Vec<_>>().join(", ");
     let hits = (0..).zip(samples).map(|(number, samples)| Hit::new(number, samples)).collect();
     let Added { hits, kept, already, types } = add_hits(store, origin, &name, &map, hits, replace, tell)?;
-    Ok(Brought { cells: 1, hits, kept, already, types, taken })
+    Ok(Brought { cells: BTreeSet::from([struck]), hits, kept, already, types, taken })
 }
 
 /// The records along the directions that the plan defines for the cell, and the number of axes of
