@@ -93,7 +93,8 @@ struct Aligned([u8; BLOCK_SAMPLE_BYTES]);
 /// The current block, as the hammer's state machine reads it.
 struct InHand<'a> {
     first_scan: u64,
-    channels: usize,
+    /// 16-bit words per scan.
+    words: usize,
     samples: &'a [[u8; 2]],
 }
 
@@ -103,11 +104,11 @@ impl Scanned for InHand<'_> {
     }
 
     fn scans(&self) -> usize {
-        self.samples.len() / self.channels
+        self.samples.len() / self.words
     }
 
     fn code(&self, scan: usize, channel: usize) -> i16 {
-        i16::from_le_bytes(self.samples[scan * self.channels + channel])
+        i16::from_le_bytes(self.samples[scan * self.words + channel])
     }
 }
 
@@ -148,12 +149,12 @@ impl<M: RawMutex> Core<'_, M> {
 
     /// Processes one delivered block and writes the codes for the drive.
     fn take(&self, delivered: Delivered, samples: &[u8; BLOCK_SAMPLE_BYTES], codes: &mut [i16]) -> Given {
-        let channels = self.facts.channels.len();
+        let words = self.words;
         let (pairs, _) = samples.as_chunks::<2>();
-        let pairs = &pairs[..(usize::from(delivered.scans) * channels).min(pairs.len())];
+        let pairs = &pairs[..(usize::from(delivered.scans) * words).min(pairs.len())];
         let over = delivered.loud && codes::is_over(pairs);
         self.with(|state| {
-            let given = state.take(delivered, channels, pairs, over, samples, codes);
+            let given = state.take(delivered, words, pairs, over, samples, codes);
             let send = state.unsent_blocks() >= BLOCKS_PER_WAKE || state.has_words();
             let sync = state.in_step().is_due();
             let Orders { coil, drive_off } = state.safety().take_orders();
@@ -168,7 +169,7 @@ impl State<'_> {
     fn take(
         &mut self,
         delivered: Delivered,
-        channels: usize,
+        words: usize,
         pairs: &[[u8; 2]],
         over: bool,
         samples: &[u8; BLOCK_SAMPLE_BYTES],
@@ -178,7 +179,7 @@ impl State<'_> {
         if delivered.missed > 0 {
             self.lose_scans(delivered.missed);
         }
-        let block = InHand { first_scan: self.safety().next_scan(), channels, samples: pairs };
+        let block = InHand { first_scan: self.safety().next_scan(), words, samples: pairs };
         let scans = block.scans();
         if scans == 0 {
             return Given::default();
@@ -186,7 +187,7 @@ impl State<'_> {
         let outcome = self.judge(&block);
         let trigger = outcome.as_ref().is_some_and(|outcome| outcome.trigger);
         let flags = if over { OVER_RANGE } else { 0 } | if trigger { TRIGGER } else { 0 };
-        self.keep(flags, scans, samples, pairs, channels);
+        self.keep(flags, scans, samples, pairs, words);
         let Driven { codes, last } = self.safety().drive(&block, codes);
         self.safety().advance(scans as u64);
         if let Some(outcome) = &outcome {

@@ -13,7 +13,7 @@
 //! indefinitely.
 
 use heapless::Vec;
-use jointrig_protocol::limits::MAX_CHANNELS;
+use jointrig_protocol::limits::CHANNEL_CAPACITY;
 #[allow(unused_imports, reason = "core has no square root; where std is linked its own is taken")]
 use micromath::F32Ext;
 
@@ -37,7 +37,7 @@ struct Motion {
 /// Evaluates consecutive windows of scans until one is quiet.
 #[derive(Clone, Debug)]
 pub struct Quiet {
-    motions: Vec<Motion, MAX_CHANNELS>,
+    motions: Vec<Motion, CHANNEL_CAPACITY>,
     window: u16,
     in_average: u16,
     averages: u16,
@@ -50,7 +50,7 @@ impl Quiet {
     /// averages. Without such a channel or a window, the structure counts as quiet.
     pub fn new(limits_codes: impl Iterator<Item = f32>, window: u16) -> Self {
         let motions = limits_codes
-            .take(MAX_CHANNELS)
+            .take(CHANNEL_CAPACITY)
             .enumerate()
             .filter(|(_, limit)| *limit > 0.0)
             .map(|(place, limit_codes)| Motion {

@@ -141,7 +141,7 @@ impl<M: RawMutex> Core<'_, M> {
                 let channel = self.facts.channels.get(usize::from(*index)).ok_or(Refusal::NoSuchChannel)?;
                 Ok(Answer::Channel(channel.clone()))
             }
-            Request::Status => Ok(Answer::Status(self.with(|state| state.status(self.facts.channels.len())))),
+            Request::Status => Ok(Answer::Status(self.with(|state| state.status(self.words)))),
             Request::Start => self.start(),
             Request::Stop => {
                 self.with(|state| state.safety().end_stream(Reason::StreamEnded));

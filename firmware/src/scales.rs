@@ -15,15 +15,15 @@ use heapless::Vec;
 use jointrig_hot::codes;
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::channel::{Channel, Role};
-use jointrig_protocol::limits::{MAX_CHANNELS, SCALE_FACTOR_CAP};
+use jointrig_protocol::limits::{CHANNEL_CAPACITY, SCALE_FACTOR_CAP};
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// SI units per code of every channel, sign included.
-pub(crate) type UnitsPerCode = Vec<f32, MAX_CHANNELS>;
+pub(crate) type UnitsPerCode = Vec<f32, CHANNEL_CAPACITY>;
 
 /// The built-in scales.
 pub(crate) fn as_built(channels: &[Channel]) -> UnitsPerCode {
-    channels.iter().take(MAX_CHANNELS).map(Channel::units_per_code_f32).collect()
+    channels.iter().take(CHANNEL_CAPACITY).map(Channel::units_per_code_f32).collect()
 }
 
 /// The scales sent by a host, if they are acceptable.
@@ -99,11 +99,11 @@ impl Friction {
         self.weights = self.columns.component_mul(&self.newtons_per_code.transpose());
     }
 
-    /// The mean of T over some scans with `channels` channels each, N. The raw codes are summed,
+    /// The mean of T over some scans of `words` 16-bit words each, N. The raw codes are summed,
     /// since T is linear in them.
-    pub fn mean_of(&self, codes: &[[u8; 2]], channels: usize) -> f32 {
-        let sums = self.places.map(|place| codes::sum(codes, channels, place) as f32);
-        (self.weights * Vector3::from(sums)).x * channels as f32 / codes.len() as f32
+    pub fn mean_of(&self, codes: &[[u8; 2]], words: usize) -> f32 {
+        let sums = self.places.map(|place| codes::sum(codes, words, place) as f32);
+        (self.weights * Vector3::from(sums)).x * words as f32 / codes.len() as f32
     }
 
     /// T of one scan, N.

@@ -15,7 +15,7 @@ use heapless::Vec;
 use jointrig_protocol::answer::{self, Refusal};
 use jointrig_protocol::channel::Channel;
 use jointrig_protocol::event::{Event, Reason};
-use jointrig_protocol::limits::{MAX_CHANNELS, SHAKE_RAMP_MS, SHAKE_SCANS_PER_CYCLE, SHAKE_VALID_CAP_MS};
+use jointrig_protocol::limits::{CHANNEL_CAPACITY, SHAKE_RAMP_MS, SHAKE_SCANS_PER_CYCLE, SHAKE_VALID_CAP_MS};
 use jointrig_protocol::request::{Control, Shake};
 
 use crate::hammer::Scanned;
@@ -51,7 +51,7 @@ pub struct Shaker<'a> {
     ordered_v: f32,
     /// Change of the amplitude per scan, V.
     slew_v: f32,
-    bounds: Vec<Bound, MAX_CHANNELS>,
+    bounds: Vec<Bound, CHANNEL_CAPACITY>,
     servo: Option<Servo>,
 }
 
@@ -176,7 +176,7 @@ impl<'a> Shaker<'a> {
         Ok(was_resting.then_some(Event::ShakerRuns))
     }
 
-    fn bounds_of(&self, limits: &[f32]) -> Vec<Bound, MAX_CHANNELS> {
+    fn bounds_of(&self, limits: &[f32]) -> Vec<Bound, CHANNEL_CAPACITY> {
         let codes = limits.iter().zip(&self.units_per_code).map(|(limit, unit)| limit / unit.abs());
         let bounds = codes.enumerate().filter(|(_, code)| *code > 0.0);
         // a limit beyond the converter's range saturates to its end, which is never exceeded

@@ -22,7 +22,7 @@ use heapless::{Deque, String};
 use jointrig_protocol::acknowledge::Acknowledge;
 use jointrig_protocol::answer::{Answer, Counters, Info, Numbered, Refusal, Reset, Status};
 use jointrig_protocol::block::RESENT;
-use jointrig_protocol::channel::{Channel, Name};
+use jointrig_protocol::channel::{Channel, Name, words_per_scan};
 use jointrig_protocol::event::{Event, Loss, Reason};
 use jointrig_protocol::hello::Hello;
 use jointrig_protocol::limits::BLOCK_SAMPLE_BYTES;
@@ -49,7 +49,7 @@ pub struct Facts<'a> {
     pub build: u64,
     /// Scans per second.
     pub scan_rate_hz: u32,
-    /// The channels of a scan, in order: 1 to 16.
+    /// The channels of a scan, in order: 1 to [`limits::CHANNEL_CAPACITY`].
     pub channels: &'a [Channel],
     /// Longest coil pulse of the board, µs.
     pub coil_cap_us: u32,
@@ -69,6 +69,8 @@ pub struct Facts<'a> {
 /// Everything that the tasks of one device share.
 pub struct Core<'a, M: RawMutex> {
     pub(crate) facts: Facts<'a>,
+    /// 16-bit words per scan.
+    pub(crate) words: usize,
     pub(crate) logs: Option<&'a Tap<M>>,
     pub(crate) state: Mutex<M, RefCell<State<'a>>>,
     /// There is something to transmit.
@@ -113,10 +115,11 @@ impl<'a, M: RawMutex> Core<'a, M> {
     /// `slots` is the memory of the ring: at least a second of all channels.
     ///
     /// # Panics
-    /// When there are no channels, more than 16, or no slots: a programming error of the board that
-    /// cannot be handled at run time.
+    /// When there are no channels, more than [`limits::CHANNEL_CAPACITY`], or no slots: a
+    /// programming error of the board that cannot be handled at run time.
     pub fn new(facts: Facts<'a>, slots: &'a mut [Slot]) -> Self {
-        assert!(limits::scans_per_block(facts.channels.len()).is_some(), "a scan has 1 to 16 channels");
+        let words = words_per_scan(facts.channels);
+        assert!(limits::scans_per_block(words).is_some(), "too few or too many channels");
         assert!(!slots.is_empty(), "the ring needs memory");
         let state = State {
             safety: Safety::new(facts.channels, facts.scan_rate_hz, facts.coil_cap_us, facts.drive_v),
@@ -124,7 +127,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
             friction: Friction::new(facts.channels),
             friction_n: 0.0,
             scales_told: false,
-            ring: Ring::new(slots, 2 * facts.channels.len()),
+            ring: Ring::new(slots, 2 * words),
             epoch: facts.boot,
             streams: 0,
             acknowledged: 0,
@@ -138,6 +141,7 @@ impl<'a, M: RawMutex> Core<'a, M> {
         };
         Self {
             facts,
+            words,
             logs: None,
             state: Mutex::new(RefCell::new(state)),
             to_send: Signal::new(),
@@ -401,9 +405,9 @@ impl State<'_> {
         self.counters.logs_dropped = dropped;
     }
 
-    /// The state of everything, for a device of `channels` channels.
-    pub fn status(&mut self, channels: usize) -> Status {
-        let friction_n = self.friction_of_last_block(channels);
+    /// The state of everything, for a device with `words` 16-bit words per scan.
+    pub fn status(&mut self, words: usize) -> Status {
+        let friction_n = self.friction_of_last_block(words);
         let safety = &self.safety;
         Status {
             epoch: self.epoch,
@@ -424,11 +428,11 @@ impl State<'_> {
     }
 
     /// Mean of T over the last block, N.
-    fn friction_of_last_block(&mut self, channels: usize) -> f32 {
+    fn friction_of_last_block(&mut self, words: usize) -> f32 {
         if self.safety.is_streaming()
             && let (Some(friction), Some(samples)) = (&self.friction, self.ring.newest())
         {
-            self.friction_n = friction.mean_of(samples.as_chunks().0, channels);
+            self.friction_n = friction.mean_of(samples.as_chunks().0, words);
         }
         self.friction_n
     }
@@ -463,7 +467,7 @@ impl State<'_> {
         scans: usize,
         samples: &[u8; BLOCK_SAMPLE_BYTES],
         pairs: &[[u8; 2]],
-        channels: usize,
+        words: usize,
     ) {
         if self.safety.is_streaming() {
             let dropped = self.ring.push(self.safety.next_scan(), flags, scans as u8, samples);
@@ -471,7 +475,7 @@ impl State<'_> {
             self.counters.scans_produced += scans as u64;
         } else if let Some(friction) = &self.friction {
             // while streaming, the ring holds the last block and the mean is computed on request
-            self.friction_n = friction.mean_of(pairs, channels);
+            self.friction_n = friction.mean_of(pairs, words);
         }
     }
 

@@ -1,4 +1,5 @@
-//! `jointrig-hil-sim`: serves the virtual board on a pseudo-terminal or a socket.
+//! `jointrig-hil-sim`: serves the virtual board on a pseudo-terminal or a socket, or plays the rig
+//! as a recorder.
 #![forbid(unsafe_code)]
 
 use std::net::TcpListener;
@@ -9,6 +10,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use jointrig_hil_sim::board::{Controls, VirtualBoard};
+use jointrig_hil_sim::play::{self, Play, Samples, Visit};
+use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::{console, serve};
 
 /// The simulated friction rig with its controller's firmware.
@@ -27,6 +30,37 @@ enum Action {
     /// `guard open|shut`, `emergency press|release` and `reset` work the safety chain. The response
     /// to each is written to stderr.
     Serve(Serve),
+    /// Write the rig's voltages to stdout as a recorder's blocks of samples (docs/bridge.md).
+    ///
+    /// An operator strikes by hand and walks through the cells: at each one the structure is at
+    /// rest, then the hits follow. Measure it with
+    /// `--device "bridge:jointrig-hil-sim play --rig RIG.toml --visit …"`.
+    Play(PlayOptions),
+}
+
+#[derive(Args)]
+struct PlayOptions {
+    /// The rig's description, with [hammer.hand].
+    #[arg(long, value_name = "FILE.toml")]
+    rig: PathBuf,
+    /// Seed of noise, scatter and every position error.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// A cell of the operator's list, for example AJB/AZ3/A3; repeat it for the next one.
+    #[arg(long = "visit", value_name = "CELL", required = true)]
+    visits: Vec<Visit>,
+    /// Hits in each cell.
+    #[arg(long, default_value_t = 3)]
+    hits: u32,
+    /// Write volts in single precision instead of the converters' codes.
+    #[arg(long)]
+    volts: bool,
+    /// Scans of a block.
+    #[arg(long, default_value_t = 2560, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    block: u32,
+    /// Deliver blocks in real time without waiting for the reader, as a recorder does.
+    #[arg(long)]
+    paced: bool,
 }
 
 #[derive(Args)]
@@ -51,8 +85,11 @@ struct Serve {
 }
 
 fn main() -> ExitCode {
-    let Action::Serve(options) = Command::parse().action;
-    match run(&options) {
+    let done = match Command::parse().action {
+        Action::Serve(options) => run(&options),
+        Action::Play(options) => run_play(options),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("jointrig-hil-sim: {error}");
@@ -61,14 +98,22 @@ fn main() -> ExitCode {
     }
 }
 
+fn description(path: &Path) -> Result<String, String> {
+    std::fs::read_to_string(path)
+        .map_err(|error| format!("cannot read the rig's description {}: {error}", path.display()))
+}
+
+fn run_play(options: PlayOptions) -> Result<(), Box<dyn std::error::Error>> {
+    let config = RigConfig::from_toml(&description(&options.rig)?)?;
+    let samples = if options.volts { Samples::F32 } else { Samples::I16 };
+    let PlayOptions { seed, visits, hits, paced, .. } = options;
+    let block = options.block as usize;
+    let what = Play { seed, visits, hits, samples, block, paced };
+    Ok(play::play(&config, &what, std::io::stdout().lock())?)
+}
+
 fn run(options: &Serve) -> Result<(), Box<dyn std::error::Error>> {
-    let rig = match &options.rig {
-        Some(path) => Some(
-            std::fs::read_to_string(path)
-                .map_err(|error| format!("cannot read the rig's description {}: {error}", path.display()))?,
-        ),
-        None => None,
-    };
+    let rig = options.rig.as_deref().map(description).transpose()?;
     if let (Some(image), Some(address)) = (&options.image, &options.tcp) {
         return serve_image(image, address, rig.as_deref(), options.seed);
     }
@@ -106,7 +151,6 @@ fn serve_image(
 ) -> Result<(), Box<dyn std::error::Error>> {
     use jointrig_hil_sim::board::Options;
     use jointrig_hil_sim::board::qemu::QemuBoard;
-    use jointrig_hil_sim::rig::RigConfig;
 
     let config = rig.map_or_else(|| Ok(RigConfig::default()), RigConfig::from_toml)?;
     let uart = Some(format!("tcp:{address},server=on,wait=off"));

@@ -35,7 +35,7 @@ fn watching_allocates_nothing_on_the_measuring_thread() {
     // ten channels, blocks of 24 scans, ten seconds; a page takes an envelope on its own thread
     // whenever there is one
     let (mut tap, mut view) = tap();
-    tap.begin(10, 0, 51_200.0);
+    tap.begin(10, 10, 0, 51_200.0);
     let block: Vec<i16> = (0..240).map(|n| n * 7 - 800).collect();
     let over = AtomicBool::new(false);
     let (looks, used) = std::thread::scope(|scope| {

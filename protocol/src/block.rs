@@ -8,10 +8,11 @@
 //! | 3 | 1 | scans in this block |
 //! | 4 | 4 | session epoch |
 //! | 8 | 8 | absolute index of the first scan |
-//! | 16 | … | scans: for each, one two's-complement 16-bit code per channel |
+//! | 16 | … | scans: for each, one two's-complement 16-bit word per channel, then one further word per wide channel |
 //!
-//! The scan index is the only clock for results. It advances whether or not a block is delivered,
-//! so
+//! A wide channel ([`crate::channel::Channel::is_wide`]) has codes of up to 30 bits. Its word among
+//! the channels contains the upper 16 bits, so that whatever reads 16-bit codes reads the same
+//! quantity; the remaining bits follow after the last channel, in the order of the wide channels.
 //!
 //! The scan index is the only time base for results. It advances whether or not a block is
 //! delivered, so that a loss is an exact range of scans. A restart begins a new epoch and never
@@ -70,7 +71,7 @@ pub struct Block<'a> {
 
 impl<'a> Block<'a> {
     /// Decodes a frame's payload. `None` when it is too short, too long or contains no scan, when
-    /// its length is not a whole number of 16-bit channels per scan, or when the scan index would
+    /// its length is not a whole number of 16-bit words per scan, or when the scan index would
     /// overflow.
     #[must_use]
     pub fn from_payload(payload: &'a [u8]) -> Option<Self> {
@@ -94,9 +95,9 @@ impl<'a> Block<'a> {
         Some(Self { header, samples })
     }
 
-    /// Channels in each scan.
+    /// 16-bit words in each scan ([`crate::channel::words_per_scan`]).
     #[must_use]
-    pub fn channels(&self) -> usize {
+    pub fn words_per_scan(&self) -> usize {
         self.samples.len() / (2 * usize::from(self.header.scans))
     }
 
@@ -106,7 +107,7 @@ impl<'a> Block<'a> {
         self.header.first_scan + u64::from(self.header.scans)
     }
 
-    /// Codes in order: scan by scan, channel by channel.
+    /// Words in order: scan by scan, channel by channel.
     pub fn codes(&self) -> impl ExactSizeIterator<Item = i16> + 'a {
         self.samples.as_chunks::<2>().0.iter().map(|b| i16::from_le_bytes(*b))
     }

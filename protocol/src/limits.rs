@@ -1,7 +1,17 @@
 //! The sizes and bounds that both ends agree on. Each is part of the schema hash.
 
-/// Most channels in one scan: two simultaneous-sampling converters with eight channels each.
+/// Most channels in one scan of a controller: two simultaneous-sampling converters with eight
+/// channels each.
 pub const MAX_CHANNELS: usize = 16;
+
+/// Most channels in one scan that this build has room for. A front end on a PC (the bridge) has up
+/// to 64 (feature `many-channels`); the controller's memory is sized for [`MAX_CHANNELS`]. Lists
+/// are sent with their length, so that both builds read each other's frames, and the schema hash
+/// is the same.
+pub const CHANNEL_CAPACITY: usize = if cfg!(feature = "many-channels") { 64 } else { MAX_CHANNELS };
+
+/// Most 16-bit words in one scan: two for each channel if all are wide.
+pub const MAX_WORDS: usize = 2 * CHANNEL_CAPACITY;
 
 /// Bytes of samples in one block: 15 scans of 16 channels, 24 scans of 10 channels, of 16 bits
 /// each.
@@ -67,11 +77,11 @@ pub const SCALE_FACTOR_CAP: u32 = 100;
 /// the shaker comes to rest (ms of the device's time).
 pub const LINK_SILENCE_MS: u32 = 1_000;
 
-/// Scans that fit one block of `channels` 16-bit channels; `None` when there are no channels or too
-/// many.
+/// Scans of `words` 16-bit words ([`crate::channel::words_per_scan`]) that fit one block; `None`
+/// when there are none or too many.
 #[must_use]
-pub const fn scans_per_block(channels: usize) -> Option<usize> {
-    if channels == 0 || channels > MAX_CHANNELS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * channels)) }
+pub const fn scans_per_block(words: usize) -> Option<usize> {
+    if words == 0 || words > MAX_WORDS { None } else { Some(BLOCK_SAMPLE_BYTES / (2 * words)) }
 }
 
 #[cfg(test)]
@@ -87,6 +97,7 @@ mod tests {
         assert_eq!(scans_per_block(16), Some(15));
         assert_eq!(scans_per_block(10), Some(24));
         assert_eq!(scans_per_block(0), None);
-        assert_eq!(scans_per_block(17), None);
+        assert_eq!(scans_per_block(MAX_WORDS), Some(240 / MAX_WORDS));
+        assert_eq!(scans_per_block(MAX_WORDS + 1), None);
     }
 }

@@ -7,7 +7,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::channel::Name;
-use crate::limits::MAX_CHANNELS;
+use crate::limits::CHANNEL_CAPACITY;
 use crate::sync::Clock;
 
 /// A numbered request. Numbers increase within a session.
@@ -95,7 +95,7 @@ pub enum Request {
     Scales {
         /// SI units per volt, sign included, of every channel in order; each nonzero, and within a
         /// factor of [`crate::limits::SCALE_FACTOR_CAP`] of the built-in value.
-        units_per_volt: Vec<f32, MAX_CHANNELS>,
+        units_per_volt: Vec<f32, CHANNEL_CAPACITY>,
     },
     /// Last measured temperature and sensor supplies. → [`crate::answer::Answer::Slow`]. Since
     /// protocol 1.1.
@@ -137,7 +137,7 @@ pub struct Fire {
     pub not_before: u64,
     /// Residual motion allowed in the quiet window, one limit per channel in the channel's unit
     /// (rms); 0 excludes a channel. See [`Fire::quiet_window`].
-    pub quiet_limits: Vec<f32, MAX_CHANNELS>,
+    pub quiet_limits: Vec<f32, CHANNEL_CAPACITY>,
     /// Length of the windows in which residual motion is evaluated, in decimated samples (0: not
     /// evaluated).
     pub quiet_window: u16,
@@ -183,7 +183,7 @@ pub struct Shake {
     pub valid_ms: u32,
     /// Magnitudes above which the shaker is brought to rest, one per channel in the channel's unit;
     /// 0 excludes a channel.
-    pub limits: Vec<f32, MAX_CHANNELS>,
+    pub limits: Vec<f32, CHANNEL_CAPACITY>,
 }
 
 impl Shake {

@@ -37,8 +37,8 @@ pub const LAYOUT: &[u64] = &[
     block::HEADER_PAYLOAD as u64,
     limits::HEAD_BYTES as u64,
     // revision of the hand-written layouts in `block`, `acknowledge`, `frame`, `packet` and of the
-    // bytes after the frozen part of `hello`
-    2,
+    // bytes after the frozen part of `hello`; since 3, channels of more than 18 bits have two words
+    3,
 ];
 
 /// Hash of the types and [`LAYOUT`].

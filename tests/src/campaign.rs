@@ -23,6 +23,12 @@ pub fn plan(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
     with_cells(&demo.replace("wanted = 3", &format!("wanted = {wanted}")), cells)
 }
 
+/// As [`plan`], for a hammer by hand.
+#[must_use]
+pub fn by_hand(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
+    plan(wanted, cells) + "\n[hammer]\nby = \"hand\"\n"
+}
+
 /// The small plan with only these cells.
 #[must_use]
 pub fn small_plan(cells: &[(&str, &[&str], &[&str])]) -> String {

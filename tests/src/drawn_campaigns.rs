@@ -44,7 +44,8 @@ impl DrawnCampaign {
         plan: fn(&RigConfig) -> String,
         more: impl FnOnce(&Path, &Address, u64),
     ) -> PathBuf {
-        let at = |ending: &str| folder.join(format!("{}-{}.{ending}", self.number, self.seed));
+        let sensors = if self.like.accelerometers { "-accelerometers" } else { "" };
+        let at = |ending: &str| folder.join(format!("{}-{}{sensors}.{ending}", self.number, self.seed));
         let (file, description) = (at("jrig"), at("toml"));
         if !file.exists() {
             let (rig, seed) = (self.rig(), 1000 * self.number + self.seed);

@@ -1,8 +1,9 @@
 //! Randomly drawn rigs, for which nothing was tuned: all parameters of the default rig are varied
 //! simultaneously.
 
+use jointrig::campaign::plan::CONTACT_BY_HAND;
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_hil_sim::rig::config::{BodyName, Bushing, ContactLaw, ResponsePoint};
+use jointrig_hil_sim::rig::config::{BodyName, Bushing, ContactLaw, Errors, ResponsePoint};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -18,12 +19,16 @@ pub struct Drawn {
     /// μN, N: contacts of even number slip as a whole beyond it (Jenkins), those of odd number have
     /// microslip below it (Iwan). `None`: no slip.
     pub slip_limit_n: Option<f64>,
+    /// Whether the rig has the accelerometers of `accelerometers.toml` and a person who strikes,
+    /// instead of lasers and a coil. Such rigs have a rigid clamp on side B: its front end has no
+    /// channels for sensors on both arm and specimen.
+    pub accelerometers: bool,
 }
 
 impl Default for Drawn {
     /// Contacts up to 300 N/µm that stick, with the default errors.
     fn default() -> Self {
-        Drawn { stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005, slip_limit_n: None }
+        Drawn { stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005, slip_limit_n: None, accelerometers: false }
     }
 }
 
@@ -120,7 +125,43 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         *error *= drawn.errors;
     }
     errors.gain = drawn.gain;
-    rig
+    if drawn.accelerometers { with_accelerometers(rig, drawn.errors) } else { rig }
+}
+
+/// The same rig with the sensors and the person of `accelerometers.toml`.
+fn with_accelerometers(rig: RigConfig, errors: f64) -> RigConfig {
+    assert!(rig.clamp_b.rigid, "rigs with a number that three divides have a clamp on side B");
+    let mut like = RigConfig::from_toml(ACCELEROMETERS).unwrap();
+    let louder = rig.sensors.vibrometer.floor / RigConfig::default().sensors.vibrometer.floor;
+    like.sensors.fixed.iter_mut().for_each(|own| own.floor *= louder);
+    like.sensors.load_cells.noise_n = rig.sensors.load_cells.noise_n;
+    like.responses.iter_mut().flat_map(|point| &mut point.sigma_m).for_each(|sigma_m| *sigma_m *= errors);
+    let position_m = errors * like.errors.position_m;
+    RigConfig {
+        sensors: like.sensors,
+        responses: like.responses,
+        hammer: like.hammer,
+        errors: Errors { position_m, transverse: errors * like.errors.transverse, ..rig.errors },
+        ..rig
+    }
+}
+
+/// The rig without lasers.
+const ACCELEROMETERS: &str = include_str!("../../hil-sim/rigs/accelerometers.toml");
+
+/// The plan for such a rig: `contact-by-hand.toml` with the known standard deviations of its errors.
+pub fn by_hand_plan(rig: &RigConfig) -> String {
+    let (head, tail) = CONTACT_BY_HAND.split_once("\n# Standard deviations of what is not known").unwrap();
+    let (_, tail) = tail.split_once("\n# B alone").unwrap();
+    let mut plan = format!("{head}\n# B alone{tail}");
+    for point in &rig.responses {
+        let (from, to) = plan.split_once(&format!("name = \"{}\"", point.name)).unwrap();
+        let (of_point, rest) = to.split_once("sigma_m = ").unwrap();
+        let (_, rest) = rest.split_once(',').unwrap();
+        let sigma_m = point.sigma_m.unwrap();
+        plan = format!("{from}name = \"{}\"{of_point}sigma_m = {sigma_m:?},{rest}", point.name);
+    }
+    with_priors(&plan, rig)
 }
 
 fn scale(bushing: &mut Bushing, factor: f64) {
@@ -152,7 +193,7 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
     let errors = &rig.errors;
     format!(
         "{plan}\n[priors]\nposition_m = {:?}\naim_m = {:?}\nhammer_angle_rad = {:?}\nspot_m = {:?}\nspecimen_point_m = {:?}\ngain = {:?}\n\
-         hammer_gain = {:?}\nskew_s = {:?}\n",
+         hammer_gain = {:?}\nskew_s = {:?}\ntransverse = {:?}\n",
         errors.position_m,
         errors.aim_m,
         errors.hammer_angle_rad,
@@ -160,7 +201,8 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
         errors.specimen_point_m,
         errors.gain,
         errors.hammer_gain,
-        errors.skew_s
+        errors.skew_s,
+        errors.transverse
     )
 }
 

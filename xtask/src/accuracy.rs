@@ -29,12 +29,13 @@ const fn source(
     Source { table, package, module, test, part: None }
 }
 
-const SOURCES: [Source; 9] = [
+const SOURCES: [Source; 10] = [
     source("contact", "jointrig-tests", "contact_accuracy", "accuracy_of_the_contacts_own_stiffness"),
     Source {
         part: Some(("PLAN", "1")),
         ..source("marks", "jointrig-tests", "contact_accuracy", "marks_beside_the_contact")
     },
+    source("accelerometers", "jointrig-tests", "contact_accuracy", "accelerometers_in_place_of_lasers"),
     source(
         "slip",
         "jointrig-tests",

@@ -41,7 +41,7 @@ const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
 /// Packages that are used together with the wheel: those of notebooks, engines that read the
 /// columns, and a scheduler.
-const OTHERS: [&str; 9] = [
+const OTHERS: [&str; 15] = [
     "pytest",
     "pytest-xdist",
     "mypy",
@@ -51,6 +51,14 @@ const OTHERS: [&str; 9] = [
     "dask[distributed]",
     "nbclient",
     "ipykernel",
+    // read the formats of docs/recipes.md
+    "npTDMS",
+    "h5py",
+    "lvm_read",
+    "soundfile",
+    // recorders for jointrig.bridge, in the versions that it was written for
+    "LDAQ==1.3.2",
+    "opendaq==3.40.3",
 ];
 
 /// The command that the wheel is compared with.

@@ -11,25 +11,26 @@ pub mod qemu;
 mod sync;
 
 use std::cell::RefCell;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use heapless::String as Text;
 use jointrig_firmware::board::Drive;
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
 use jointrig_protocol::answer::{Info, Reset};
+use jointrig_protocol::channel::words_per_scan;
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, scans_per_block};
 
 use crate::executor::{Poller, Polling, Woken, jump};
 use crate::link::{DeviceEnd, HostEnd, pair};
 use crate::rig::{Rig, RigConfig, RigError};
+use jointrig_native::tasks::{NativeCore, Parts};
 use parts::VirtualDrive;
+pub(crate) use parts::describe;
 pub use parts::{Controls, Seen, Virtual};
-use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage, describe};
+use parts::{VirtualCoil, VirtualInputs, VirtualScans, VirtualStage};
 pub use sync::Wires;
 
 /// Minimum duration of the scans that the ring holds (s).
@@ -118,13 +119,14 @@ impl Drop for VirtualBoard {
 fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) {
     let channels: &'static [_] = describe(rig.channels());
     let rate_hz = rig.scan_rate_hz();
-    let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
+    let words = words_per_scan(channels);
+    let per_block = scans_per_block(words).expect("the rig has ten channels or more");
     let slots = ring_slots(rate_hz, per_block);
     let drive = VirtualDrive::default();
     let facts = Facts {
         board: name(Info::VIRTUAL_BOARD),
         serial: name(&format!("sim-{:016x}", options.seed)),
-        target: text(env!("JOINTRIG_TARGET")),
+        target: text(jointrig_native::TARGET),
         build: 0,
         scan_rate_hz: rate_hz,
         channels,
@@ -135,13 +137,20 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
         reset: Reset::Power,
         boot: options.boot,
     };
-    let core: Rc<Core<'static, NoopRawMutex>> =
+    let core: Rc<NativeCore> =
         Rc::new(Core::new(facts, Box::leak(vec![Slot::EMPTY; slots].into_boxed_slice())));
     let rig = Rc::new(RefCell::new(rig));
-    let scans = VirtualScans::new(&rig, &drive, controls, per_block, !options.free_running);
+    let scans = VirtualScans::new(&rig, &drive, controls, [words, per_block], !options.free_running);
     let sampling = scans.sampling();
     let woken = Arc::new(Woken::default());
-    let mut poller = Poller::new(options.polling, futures(&core, &rig, scans, drive, link, controls), &woken);
+    let parts = Parts {
+        scans,
+        coil: VirtualCoil::new(&rig, controls),
+        inputs: VirtualInputs::new(controls, &rig),
+        stage: VirtualStage::new(&rig),
+        drive,
+    };
+    let mut poller = Poller::new(options.polling, parts.tasks(&core, link), &woken);
     while !link.is_closed() {
         while woken.take() {
             poller.poll();
@@ -155,35 +164,6 @@ fn run(rig: Rig, options: &Options, link: &DeviceEnd, controls: &Arc<Controls>) 
             link.sleep(&woken);
         }
     }
-}
-
-fn futures(
-    core: &Rc<Core<'static, NoopRawMutex>>,
-    rig: &Rc<RefCell<Rig>>,
-    mut scans: VirtualScans,
-    mut drive: VirtualDrive,
-    link: &DeviceEnd,
-    controls: &Arc<Controls>,
-) -> Vec<Pin<Box<dyn Future<Output = ()>>>> {
-    let mut coil = VirtualCoil::new(rig, controls);
-    let mut inputs = VirtualInputs::new(controls, rig);
-    let mut stage = VirtualStage::new(rig);
-    let (mut source, mut sink) = (link.clone(), link.clone());
-    let (a, b, c, d) = (Rc::clone(core), Rc::clone(core), Rc::clone(core), Rc::clone(core));
-    vec![
-        Box::pin(async move {
-            jointrig_firmware::acquire::acquire(&a, &mut scans, &mut coil, &mut drive, &mut inputs).await;
-        }),
-        Box::pin(async move {
-            jointrig_firmware::receive::receive(&b, &mut source, &mut stage).await;
-        }),
-        Box::pin(async move {
-            jointrig_firmware::transmit::transmit(&c, &mut sink).await;
-        }),
-        Box::pin(async move {
-            jointrig_firmware::watch::watch(&d).await;
-        }),
-    ]
 }
 
 /// Number of blocks that the ring must hold.

@@ -6,7 +6,6 @@
 use super::sync::{PERIOD, SyncPort, Wires};
 use crate::link::DeviceEnd;
 use crate::rig;
-use crate::rig::channels::{EXCITATION, FORCE};
 use crate::rig::config::Cable;
 use crate::rig::{Configuration, JointState, Measured, Rig, RigError, config};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -143,7 +142,7 @@ impl Controls {
 
 /// The rig's channels as protocol types. They are leaked: a firmware's channel table is constant,
 /// and a program creates only a few boards.
-pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
+pub(crate) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
     let cell_or_other = |channel: &rig::Channel| match channel.name.as_str() {
         "force" => Role::HammerForce,
         "ldv_a" => Role::SpecimenA,
@@ -161,11 +160,12 @@ pub(super) fn describe(channels: &[rig::Channel]) -> &'static [Channel] {
         quantity: match channel.quantity {
             Measured::Force => Quantity::Force,
             Measured::Velocity => Quantity::Velocity,
+            Measured::Acceleration => Quantity::Acceleration,
         },
         units_per_volt: (channel.units_per_volt * f64::from(channel.polarity)) as f32,
         range_v: channel.range_v as f32,
         delay_ns: (channel.delay_s * 1e9).round() as u32,
-        bits: 16,
+        bits: channel.bits,
     });
     Box::leak(described.collect::<Vec<_>>().into_boxed_slice())
 }
@@ -175,7 +175,8 @@ pub struct VirtualScans {
     rig: Rc<RefCell<Rig>>,
     drive: VirtualDrive,
     controls: Arc<Controls>,
-    channels: usize,
+    /// 16-bit words per scan.
+    words: usize,
     per_block: usize,
     rate_hz: u64,
     scans: u64,
@@ -191,16 +192,16 @@ impl VirtualScans {
         rig: &Rc<RefCell<Rig>>,
         drive: &VirtualDrive,
         controls: &Arc<Controls>,
-        per_block: usize,
+        [words, per_block]: [usize; 2],
         held: bool,
     ) -> Self {
-        let (channels, rate_hz) = (rig.borrow().channels().len(), u64::from(rig.borrow().scan_rate_hz()));
+        let rate_hz = u64::from(rig.borrow().scan_rate_hz());
         let (rig, drive, controls) = (Rc::clone(rig), drive.clone(), Arc::clone(controls));
         Self {
             rig,
             drive,
             controls,
-            channels,
+            words,
             per_block,
             rate_hz,
             scans: 0,
@@ -246,14 +247,7 @@ impl Scans for VirtualScans {
         self.sampling.set(false);
         // the rig advances during lost blocks too
         for _ in 0..=lost {
-            fill(
-                &mut self.rig.borrow_mut(),
-                &self.drive,
-                &self.controls,
-                self.channels,
-                self.per_block,
-                block,
-            );
+            fill(&mut self.rig.borrow_mut(), &self.drive, &self.controls, self.words, self.per_block, block);
         }
         Delivered { scans: self.per_block as u8, missed: (lost * self.per_block as u64) as u32, loud: true }
     }
@@ -264,25 +258,25 @@ pub(super) fn fill(
     rig: &mut Rig,
     drive: &VirtualDrive,
     controls: &Controls,
-    channels: usize,
+    words: usize,
     per_block: usize,
     block: &mut [u8; BLOCK_SAMPLE_BYTES],
 ) {
-    let mut codes = [0; jointrig_protocol::limits::MAX_CHANNELS];
+    let mut codes = [0; jointrig_protocol::limits::MAX_WORDS];
     if let Some(load) = controls.normal_load_n.lock().unwrap_or_else(PoisonError::into_inner).take() {
         // Checked when it was ordered, except for a load that varies too steeply at that value:
         // then the old load stays.
         let _ = rig.set_normal_load(load);
     }
     let mut seen = controls.seen();
-    for scan in block.chunks_exact_mut(2 * channels).take(per_block) {
+    for scan in block.chunks_exact_mut(2 * words).take(per_block) {
         seen.drive_v = drive.next_v();
         seen.scans += 1;
         if seen.drive_v != 0.0 {
             seen.driven_until = seen.scans;
         }
         rig.drive(seen.drive_v);
-        rig.scan(&mut codes[..channels]);
+        rig.scan(&mut codes[..words]);
         for (bytes, code) in scan.as_chunks_mut::<2>().0.iter_mut().zip(codes) {
             *bytes = code.to_le_bytes();
         }
@@ -352,10 +346,10 @@ impl VirtualInputs {
         let around = &rig.config().surroundings;
         let seconds = seen.scans as f64 / f64::from(rig.scan_rate_hz());
         let changed = *self.controls.cables.lock().unwrap_or_else(PoisonError::into_inner);
-        let cables = [(FORCE, around.force_cable), (EXCITATION, around.excitation_cable)];
-        let supplies = cables.into_iter().zip(changed).map(|((place, cable), changed)| Supply {
-            channel: place as u8,
-            bias_v: changed.unwrap_or(cable).bias_v(),
+        let cables = [("force", around.force_cable), ("excitation", around.excitation_cable)];
+        let supplies = cables.into_iter().zip(changed).filter_map(|((name, cable), changed)| {
+            let channel = rig.channels().iter().position(|channel| channel.name == name)? as u8;
+            Some(Supply { channel, bias_v: changed.unwrap_or(cable).bias_v() })
         });
         Slow {
             temperature_c: Some((around.temperature_c + around.warming_k_per_s * seconds) as f32),

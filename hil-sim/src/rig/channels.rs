@@ -2,7 +2,7 @@
 
 use super::config;
 
-/// Number of channels of the rig, without additional fixed vibrometers.
+/// Number of channels of the rig, without additional fixed sensors.
 pub const CHANNELS: usize = 10;
 /// Index of the hammer's force.
 pub const FORCE: usize = 0;
@@ -29,21 +29,36 @@ pub enum Measured {
     Force,
     /// Velocity (m/s).
     Velocity,
+    /// Acceleration (m/s²).
+    Acceleration,
+}
+
+impl Measured {
+    /// Its SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s²",
+        }
+    }
 }
 
 /// One channel of the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// Its name: `force`, `vib_x` … `excitation`, or the rig's name of a fixed vibrometer.
+    /// Its name: `force`, `vib_x` … `excitation`, or the rig's name of a fixed sensor.
     pub name: String,
     /// What it measures.
     pub quantity: Measured,
-    /// `N` or `m/s`.
+    /// `N`, `m/s` or `m/s²`.
     pub unit: &'static str,
     /// Units per volt.
     pub units_per_volt: f64,
     /// Converter range, ± this (V).
     pub range_v: f64,
+    /// Bits of the converter.
+    pub bits: u8,
     /// Delay of the signal (s).
     pub delay_s: f64,
     /// 1, or −1 for a reversed sensor.
@@ -56,7 +71,7 @@ pub struct Channel {
 impl Channel {
     /// Value of one converter step, in the channel's unit.
     pub fn step(&self) -> f64 {
-        self.units_per_volt * self.range_v / 32768.0
+        self.units_per_volt * self.range_v / f64::from(1_u32 << (self.bits - 1))
     }
 }
 
@@ -65,9 +80,10 @@ pub fn channels(sensors: &config::Sensors) -> [Channel; CHANNELS] {
     let channel = |name: &str, quantity, units_per_volt, delay_s, polarity, axis| Channel {
         name: name.to_owned(),
         quantity,
-        unit: if quantity == Measured::Force { "N" } else { "m/s" },
+        unit: quantity.unit(),
         units_per_volt,
         range_v: sensors.range_v,
+        bits: sensors.bits,
         delay_s,
         polarity,
         axis,

@@ -19,8 +19,8 @@ use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
-use sensors::FixedSensors;
 use sensors::Sensors;
+use sensors::{Direct, FixedSensors};
 use stepper::{ScanForces, Slipping, Span, Stepper};
 
 pub use channels::{CHANNELS, Channel, Measured};
@@ -57,8 +57,10 @@ pub struct Rig {
     config: RigConfig,
     seed: u64,
     period_s: f64,
-    /// The ten, then the fixed vibrometers.
+    /// The ten, then the fixed sensors.
     channels: Vec<Channel>,
+    /// The channels that the front end has; `None` if it has all.
+    connected: Option<Connected>,
     flaws: Flaws,
     plants: [Plant; 3],
     configuration: Configuration,
@@ -71,6 +73,7 @@ pub struct Rig {
     slipping: Option<Slipping>,
     sensors: Sensors,
     fixed: FixedSensors,
+    direct: Vec<Direct>,
     /// Hammer forces that act now or later, on the clock below.
     pending: Vec<ForceSegment>,
     /// Scans since the last stage or fire.
@@ -106,6 +109,7 @@ impl Rig {
         let sensors = Sensors::new(config, &ten, &flaws, None, stream(seed, &["at rest"]));
         let fixed = FixedSensors::new(config, &flaws.fixed, flaws.latency_scans, stream(seed, &["at rest"]));
         let channels: Vec<Channel> = ten.into_iter().chain(sensors::fixed_channels(config)).collect();
+        let connected = Connected::of(&channels, &config.sensors.left_out);
         let configuration = Configuration::Ajb;
         // check() has verified that there is at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
@@ -125,7 +129,9 @@ impl Rig {
             slipping,
             sensors,
             fixed,
+            direct: Vec::new(),
             channels,
+            connected,
             flaws,
             pending: Vec::new(),
             scans: 0,
@@ -145,9 +151,10 @@ impl Rig {
         self.config.scan_rate_hz
     }
 
-    /// The ten channels, then the fixed vibrometers, in the order of the codes.
+    /// The ten channels as far as the front end has them, then the fixed sensors, in the order of
+    /// the codes.
     pub fn channels(&self) -> &[Channel] {
-        &self.channels
+        self.connected.as_ref().map_or(&self.channels, |connected| &connected.channels)
     }
 
     /// The rig's parameters.
@@ -190,6 +197,7 @@ impl Rig {
         let plant = &self.plants[configuration as usize];
         let (stepper, slipping) = plant.aimed(&self.config, &self.flaws, &aim, &self.channels)?;
         let speckle = seen.speckle;
+        self.direct = plant.direct(&self.config, &self.flaws, &aim);
         self.aim = aim;
         self.stepper = stepper;
         self.slipping = slipping;
@@ -283,9 +291,22 @@ impl Rig {
         Ok(())
     }
 
-    /// Advances exactly one scan period and samples: one code per channel, in order. A shorter
-    /// slice receives the first channels; the end of a longer one is unchanged.
+    /// Advances exactly one scan period and samples: one 16-bit word per channel, in order, then the
+    /// lower words of wide codes ([`jointrig_protocol::block`]). A shorter slice receives the first
+    /// words; the end of a longer one is unchanged.
     pub fn scan(&mut self, codes: &mut [i16]) {
+        let Some(mut connected) = self.connected.take() else { return self.scan_all(codes) };
+        self.scan_all(&mut connected.codes);
+        // the upper words, or 16-bit codes, of all channels; then the lower words
+        let all = self.channels.len();
+        let places = connected.places.iter().copied();
+        for (code, place) in codes.iter_mut().zip(places.clone().chain(places.map(|place| all + place))) {
+            *code = connected.codes[place];
+        }
+        self.connected = Some(connected);
+    }
+
+    fn scan_all(&mut self, codes: &mut [i16]) {
         if let Some(hand) = self.config.hammer.hand
             && self.scans == (hand.every_s * f64::from(self.config.scan_rate_hz)).round() as u64
         {
@@ -302,13 +323,23 @@ impl Rig {
         self.truth[FORCE] = self.sensors.hammer_n(&self.pending, from_s, to_s);
         self.truth[FIRST_SIGNAL..EXCITATION].copy_from_slice(&self.stepper.signals());
         self.truth[EXCITATION] = shaker_n;
+        let hammer_n: f64 = self.pending.iter().map(|segment| segment.value_n(to_s)).sum();
         if self.pending.first().is_some_and(|segment| segment.end_s <= to_s) {
             self.pending.retain(|segment| segment.end_s > to_s);
         }
-        self.sensors.convert(self.truth, codes);
+        let (codes, lower) = codes.split_at_mut(codes.len().min(self.channels.len()));
+        self.sensors.convert(self.truth, codes, lower);
         if self.channels.len() > CHANNELS {
-            let stepper = &self.stepper;
-            self.fixed.convert(|into| stepper.fixed(into), codes.get_mut(CHANNELS..).unwrap_or_default());
+            let (stepper, direct) = (&self.stepper, &self.direct);
+            let push_n = self.slipping.as_ref().map_or(0.0, |slipping| slipping.sliders().push_n());
+            let read = |into: &mut [f64]| {
+                stepper.fixed(into);
+                for (signal, direct) in into.iter_mut().zip(direct) {
+                    *signal += direct.hammer * hammer_n + direct.shaker * shaker_n + direct.joint * push_n;
+                }
+            };
+            let [codes, lower] = [codes, lower].map(|words| words.get_mut(CHANNELS..).unwrap_or_default());
+            self.fixed.convert(read, codes, lower);
         }
     }
 
@@ -426,6 +457,25 @@ pub enum RigError {
         /// What failed.
         what: &'static str,
     },
+}
+
+/// The channels of a front end that lacks some of the rig's.
+#[derive(Debug, Clone)]
+struct Connected {
+    channels: Vec<Channel>,
+    /// Their indices among all.
+    places: Vec<usize>,
+    /// The codes of all channels in the last scan, and the lower words of wide ones.
+    codes: Vec<i16>,
+}
+
+impl Connected {
+    /// `None` if none is left out.
+    fn of(all: &[Channel], left_out: &[String]) -> Option<Self> {
+        let there = all.iter().enumerate().filter(|(_, channel)| !left_out.contains(&channel.name));
+        let (channels, places) = there.map(|(place, channel)| (channel.clone(), place)).unzip();
+        (!left_out.is_empty()).then(|| Self { channels, places, codes: vec![0; 2 * all.len()] })
+    }
 }
 
 /// `v` normalised to length one; `v` must not be zero.

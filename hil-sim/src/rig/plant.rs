@@ -6,12 +6,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
-use super::config::{BodyName, Contact, ContactLaw, RigConfig};
+use super::config::{BodyName, Contact, ContactLaw, FixedQuantity, FixedSensor, RigConfig};
 use super::modal::StateSpace;
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
-use super::sensors::FixedRows;
-use super::sensors::Flaws;
+use super::sensors::{Direct, FixedFlaw, FixedRows, Flaws};
 use super::sliders::Sliders;
 use super::stepper::{Aimed, ExponentialStepper, Joint, ModalStepper, Slipping, Stepper};
 use super::structure::Structure;
@@ -95,6 +94,13 @@ impl Plant {
             let row = row.map(|row| self.space.displacement(&row));
             row.unwrap_or_else(nothing) * it.stiffness_n_per_m[2]
         };
+        let fixed = |(own, flaw): (&FixedSensor, &FixedFlaw)| {
+            let velocity = velocity(&flaw.probe).unwrap_or_else(nothing);
+            match own.quantity {
+                FixedQuantity::Velocity => velocity,
+                FixedQuantity::Acceleration => self.space.a.tr_mul(&velocity),
+            }
+        };
         let hit = self.structure.row(&aim.impact).ok_or_else(|| missing(&aim.impact))?;
         let pushed =
             Probe { body: config.shaker.body, position_m: config.shaker.position_m, direction: sliding };
@@ -115,7 +121,7 @@ impl Plant {
             steps: std::array::from_fn(|signal| channels[FIRST_SIGNAL + signal].step()),
             joint: self.joint(&config.contact),
             fixed: FixedRows {
-                rows: flaws.fixed.iter().map(|own| velocity(&own.probe).unwrap_or_else(nothing)).collect(),
+                rows: config.sensors.fixed.iter().zip(&flaws.fixed).map(fixed).collect(),
                 steps: channels[CHANNELS..].iter().map(Channel::step).collect(),
             },
         };
@@ -140,6 +146,30 @@ impl Plant {
             line: None,
         })?;
         Ok((stepper, Some(slipping)))
+    }
+
+    /// What the fixed sensors read directly of the forces of the same moment.
+    pub(super) fn direct(&self, config: &RigConfig, flaws: &Flaws, aim: &Aim) -> Vec<Direct> {
+        let nothing = || DVector::zeros(self.space.order());
+        let input = |row: Option<DVector<f64>>| row.map_or_else(nothing, |row| self.space.input(&row));
+        let shaker = &config.shaker;
+        let pushed =
+            Probe { body: shaker.body, position_m: shaker.position_m, direction: config.contact.sliding() };
+        let hammer = input(self.structure.row(&aim.impact));
+        let shaker = input(self.structure.row(&pushed));
+        let joint = self.joint(&config.contact).map_or_else(nothing, |joint| joint.column);
+        let one = |(own, flaw): (&FixedSensor, &FixedFlaw)| match own.quantity {
+            FixedQuantity::Velocity => Direct::default(),
+            FixedQuantity::Acceleration => {
+                let velocity = input(self.structure.row(&flaw.probe));
+                Direct {
+                    hammer: velocity.dot(&hammer),
+                    shaker: velocity.dot(&shaker),
+                    joint: velocity.dot(&joint),
+                }
+            }
+        };
+        config.sensors.fixed.iter().zip(&flaws.fixed).map(one).collect()
     }
 
     /// The joint, if there is one that can slip.

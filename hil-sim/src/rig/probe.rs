@@ -141,11 +141,7 @@ pub(super) fn shifted(position_m: [f64; 3], sigma_m: f64, stream: &mut Stream) -
 /// `direction` rotated by a random angle about each of two axes normal to it.
 fn tilted(direction: [f64; 3], sigma_rad: f64, stream: &mut Stream) -> [f64; 3] {
     let (about_first, about_second) = (sigma_rad * normal(stream), sigma_rad * normal(stream));
-    // The axis with the smallest component along the direction gives a well-conditioned first
-    // perpendicular.
-    let least = (0..3).min_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap_or(0);
-    let first = normalized(cross(direction, AXES[least]));
-    let second = cross(direction, first);
+    let [first, second] = across(direction);
     // A rotation vector normal to the direction rotates it by the vector's length.
     let angle = about_first.hypot(about_second);
     if angle == 0.0 {
@@ -154,6 +150,15 @@ fn tilted(direction: [f64; 3], sigma_rad: f64, stream: &mut Stream) -> [f64; 3] 
     let axis: [f64; 3] = std::array::from_fn(|i| (first[i] * about_first + second[i] * about_second) / angle);
     let across = cross(axis, direction);
     std::array::from_fn(|i| direction[i] * angle.cos() + across[i] * angle.sin())
+}
+
+/// Two unit vectors at right angles to the unit vector `direction` and to each other.
+pub(super) fn across(direction: [f64; 3]) -> [[f64; 3]; 2] {
+    // The axis with the smallest component along the direction gives a well-conditioned first
+    // perpendicular.
+    let least = (0..3).min_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs())).unwrap_or(0);
+    let first = normalized(cross(direction, AXES[least]));
+    [first, cross(direction, first)]
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -1,24 +1,30 @@
 //! The sensors and their errors: from true signals to converter codes.
 //!
-//! code = round(volts / range · 32768), saturating, volts = (delayed signal · polarity + noise) /
-//! scale. A delay has whole scans and a fraction of one. Noise is drawn for every channel in every
+//! code = round(volts / range · 2^(bits-1)), saturating, volts = (delayed signal · polarity +
+//! noise) / scale; the codes of all channels have 16 bits, or all are wide
+//! ([`jointrig_protocol::block`]). A delay has whole scans and a fraction of one. Noise is drawn for every channel in every
 //! scan, present or not, so that a channel's stream does not depend on the others. Cross-talk, gain
 //! and skew ([`Flaws`]) are applied before the noise. The errors of a campaign's instruments, also
 //! the true positions of the spots, are keyed to (seed, purpose): the same in every cell and
 //! configuration, whatever was visited before.
 //!
-//! Fixed vibrometers stay at one point while the hammer moves; each has its own channel after the
-//! ten. Their errors are of the same kinds as those of the other vibrometers: true position (keyed
-//! to the response point as for the 3-D vibrometer, but without the aiming error), gain, skew and
-//! noise. Their noise has a separate stream, so that they do not change the ten channels.
+//! Fixed sensors (vibrometers, accelerometers) stay at one point while the hammer moves; each has
+//! its own channel after the ten. Their errors are of the same kinds as those of the vibrometers:
+//! true position (keyed to the response point as for the 3-D vibrometer, but without the aiming
+//! error), gain, skew and noise, and a sensitivity to motion across their direction. Their noise has
+//! a separate stream, so that they do not change the ten channels.
+//!
+//! An accelerometer's signal is c (A x + b f), with the row c of its velocity: it contains the
+//! forces of the same moment directly.
 
 use super::channels::{CHANNELS, Channel, FORCE, LOAD_CELLS, Measured, VIBROMETER, is_gauged};
-use super::config::{FixedVibrometer, Hammer, RigConfig, Spot, Spots};
+use super::config::{FixedQuantity, FixedSensor, Hammer, RigConfig, Spot, Spots};
 use super::force::ForceSegment;
 use super::hammer::nominal_width_s;
 use super::key::{Stream, normal, stream, uniform};
-use super::probe::{Probe, shifted};
+use super::probe::{Probe, across, shifted};
 use super::{config, normalized};
+use jointrig_protocol::channel::{NARROW_BITS, split_code};
 use nalgebra::DVector;
 use num_complex::Complex;
 use std::f64::consts::PI;
@@ -26,12 +32,16 @@ use std::f64::consts::PI;
 /// Converts the true signals to codes.
 #[derive(Debug, Clone)]
 pub struct Sensors {
+    /// Bits of the converters.
+    bits: u8,
     codes_per_unit: [f64; CHANNELS],
     /// Noise (codes rms) of each channel.
     noise: [f64; CHANNELS],
     delays: Vec<(usize, DelayLine)>,
     cross_talk: Option<[[f64; 3]; 3]>,
     cell: ForceCell,
+    /// Whether the first load cell's channel is the sum of all three.
+    summed: bool,
     speckle: Option<Speckle>,
     stream: Stream,
 }
@@ -75,12 +85,14 @@ impl Sensors {
             .map(|(channel, skew_s)| f64::from(flaws.latency_scans) + (channel.delay_s + skew_s) * rate_hz);
         let delays = late_scans.enumerate().filter(|(_, late)| *late > 0.0);
         Self {
+            bits: sensors.bits,
             codes_per_unit,
             noise,
             delays: delays.map(|(at, late)| (at, DelayLine::new(late))).collect(),
             cross_talk: Some(flaws.cross_talk)
                 .filter(|parts| parts.as_flattened().iter().any(|part| *part != 0.0)),
             cell: ForceCell::new(&sensors.force, &config.hammer, 1.0 / rate_hz),
+            summed: sensors.load_cells.summed,
             speckle: speckle.map(|stream| Speckle::new(&sensors.vibrometer.speckle, rate_hz, stream)),
             stream,
         }
@@ -101,14 +113,18 @@ impl Sensors {
         self.cell.reads(hammer, from_s, to_s)
     }
 
-    /// Converts one scan's true signals.
+    /// Converts one scan's true signals: `codes` are 16-bit codes or the upper words of wide codes,
+    /// whose lower words go into `lower`.
     #[inline]
-    pub fn convert(&mut self, mut signals: [f64; CHANNELS], codes: &mut [i16]) {
+    pub fn convert(&mut self, mut signals: [f64; CHANNELS], codes: &mut [i16], lower: &mut [i16]) {
         if let Some(parts) = &self.cross_talk {
             let own = LOAD_CELLS.map(|at| signals[at]);
             for (at, parts) in LOAD_CELLS.into_iter().zip(parts) {
                 signals[at] += parts.iter().zip(own).map(|(part, force_n)| part * force_n).sum::<f64>();
             }
+        }
+        if self.summed {
+            signals[LOAD_CELLS[0]] = LOAD_CELLS.iter().map(|at| signals[*at]).sum();
         }
         for (at, line) in &mut self.delays {
             signals[*at] = line.pass(signals[*at]);
@@ -130,6 +146,12 @@ impl Sensors {
         self.stream = stream;
         for at in 0..CHANNELS {
             exact[at] = signals[at] * self.codes_per_unit[at] + noise[at] * exact[at];
+        }
+        if self.bits > NARROW_BITS {
+            let words = exact.map(|exact| split_code(wide_code(exact, self.bits), self.bits));
+            codes.iter_mut().zip(words).for_each(|(code, [upper, _])| *code = upper);
+            lower.iter_mut().zip(words).for_each(|(code, [_, lower])| *code = lower);
+            return;
         }
         let rounded = exact.map(code);
         let given = codes.len().min(CHANNELS);
@@ -255,7 +277,13 @@ impl DelayLine {
     }
 }
 
-/// Rounded to the nearest code, saturating.
+/// Rounded to the nearest code of a converter of more than 16 bits, saturating.
+fn wide_code(exact: f64, bits: u8) -> i32 {
+    let half = f64::from(1_u32 << (bits - 1));
+    exact.round().clamp(-half, half - 1.0) as i32
+}
+
+/// Rounded to the nearest code of 16 bits, saturating.
 #[inline]
 pub(super) fn code(exact: f64) -> i16 {
     // At 1.5 · 2^52 the last bit of an f64 is one, so the sum rounds and its low bits are the
@@ -267,7 +295,7 @@ pub(super) fn code(exact: f64) -> i16 {
     (within + ONES_PLACE).to_bits() as i16
 }
 
-/// Errors of one fixed vibrometer.
+/// Errors of one fixed sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixedFlaw {
     /// Its true position and direction.
@@ -282,7 +310,7 @@ pub struct FixedFlaw {
 /// verified that the points exist.
 fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
     let errors = config.errors.acting();
-    let one = |own: &FixedVibrometer| {
+    let one = |own: &FixedSensor| {
         let point = config.responses.iter().find(|point| point.name == own.response)?;
         let sigma_m = if point.body.is_specimen() { errors.specimen_point_m } else { errors.position_m };
         let sigma_m = point.sigma_m.filter(|_| !errors.none).unwrap_or(sigma_m);
@@ -293,7 +321,7 @@ fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
             probe: Probe {
                 body: point.body,
                 position_m: shifted(point.position_m, sigma_m, &mut place),
-                direction: normalized(own.direction),
+                direction: sensitive(own, errors.transverse, seed),
             },
             gain: stated * (1.0 + errors.gain * draw("gain")),
             skew_s: errors.skew_s * draw("skew"),
@@ -302,14 +330,33 @@ fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
     config.sensors.fixed.iter().filter_map(one).collect()
 }
 
+/// The direction of a fixed sensor with its drawn sensitivities across it: its reading is the motion
+/// along this vector, whose length is not one.
+fn sensitive(own: &FixedSensor, transverse: f64, seed: u64) -> [f64; 3] {
+    let direction = normalized(own.direction);
+    if transverse == 0.0 {
+        return direction;
+    }
+    let mut stream = stream(seed, &["transverse", &own.name]);
+    across(direction).into_iter().fold(direction, |sum, across| {
+        let part = transverse * normal(&mut stream);
+        std::array::from_fn(|axis| sum[axis] + part * across[axis])
+    })
+}
+
 /// Their channels, in the order of the configuration.
 pub(super) fn fixed_channels(config: &RigConfig) -> Vec<Channel> {
-    let one = |own: &FixedVibrometer| Channel {
+    let quantity = |own: &FixedSensor| match own.quantity {
+        FixedQuantity::Velocity => Measured::Velocity,
+        FixedQuantity::Acceleration => Measured::Acceleration,
+    };
+    let one = |own: &FixedSensor| Channel {
         name: own.name.clone(),
-        quantity: Measured::Velocity,
-        unit: "m/s",
+        quantity: quantity(own),
+        unit: quantity(own).unit(),
         units_per_volt: own.units_per_volt,
         range_v: config.sensors.range_v,
+        bits: config.sensors.bits,
         delay_s: own.delay_s,
         polarity: own.polarity,
         axis: None,
@@ -322,13 +369,24 @@ pub(super) fn fixed_channels(config: &RigConfig) -> Vec<Channel> {
 pub struct FixedRows {
     /// Row of each; zero where the configuration lacks the body.
     pub rows: Vec<DVector<f64>>,
-    /// Size of one converter step of each (m/s).
+    /// Size of one converter step of each, in its own unit.
     pub steps: Vec<f64>,
+}
+
+/// How much an accelerometer reads per newton of the forces of the same moment (m/s² per N): the
+/// hammer's, the shaker's, and that by which a slipping contact differs from its stuck spring. Zero
+/// for a vibrometer.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Direct {
+    pub hammer: f64,
+    pub shaker: f64,
+    pub joint: f64,
 }
 
 /// Converts the true signals to codes.
 #[derive(Debug, Clone)]
 pub(super) struct FixedSensors {
+    bits: u8,
     own: Vec<One>,
     signals: Vec<f64>,
     stream: Stream,
@@ -346,7 +404,7 @@ impl FixedSensors {
     /// With the cell's idle `stream`; all channels are delayed by `latency_scans`.
     pub(super) fn new(config: &RigConfig, flaws: &[FixedFlaw], latency_scans: u32, stream: Stream) -> Self {
         let rate_hz = f64::from(config.scan_rate_hz);
-        let one = |((own, channel), flaw): ((&FixedVibrometer, Channel), &FixedFlaw)| {
+        let one = |((own, channel), flaw): ((&FixedSensor, Channel), &FixedFlaw)| {
             let late = f64::from(latency_scans) + (own.delay_s + flaw.skew_s) * rate_hz;
             One {
                 codes_per_unit: flaw.gain * f64::from(own.polarity) / channel.step(),
@@ -357,7 +415,7 @@ impl FixedSensors {
         };
         let own: Vec<One> =
             config.sensors.fixed.iter().zip(fixed_channels(config)).zip(flaws).map(one).collect();
-        Self { signals: vec![0.0; own.len()], own, stream }
+        Self { bits: config.sensors.bits, signals: vec![0.0; own.len()], own, stream }
     }
 
     /// A hit begins: the noise stream restarts here.
@@ -365,8 +423,9 @@ impl FixedSensors {
         self.stream = stream;
     }
 
-    /// Converts one scan: `read` fills in the true signals.
-    pub(super) fn convert(&mut self, read: impl FnOnce(&mut [f64]), codes: &mut [i16]) {
+    /// Converts one scan: `read` fills in the true signals; `codes` and `lower` as for
+    /// [`Sensors::convert`].
+    pub(super) fn convert(&mut self, read: impl FnOnce(&mut [f64]), codes: &mut [i16], lower: &mut [i16]) {
         read(&mut self.signals);
         for (at, own) in self.own.iter_mut().enumerate() {
             let signal = match &mut own.delay {
@@ -374,8 +433,15 @@ impl FixedSensors {
                 None => self.signals[at],
             };
             let exact = signal * own.codes_per_unit + own.noise * normal(&mut self.stream);
-            if let Some(given) = codes.get_mut(at) {
-                *given = code(exact);
+            let words = if self.bits > NARROW_BITS {
+                split_code(wide_code(exact, self.bits), self.bits)
+            } else {
+                [code(exact), 0]
+            };
+            for (words, word) in [&mut *codes, &mut *lower].into_iter().zip(words) {
+                if let Some(given) = words.get_mut(at) {
+                    *given = word;
+                }
             }
         }
     }

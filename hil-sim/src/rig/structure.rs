@@ -68,6 +68,7 @@ impl Structure {
                 structure.connect(None, Some(held), cell);
             }
         }
+        structure.carry_sensors(config);
         structure
     }
 
@@ -114,7 +115,23 @@ impl Structure {
             structure.add_inertia(BodyName::ArmB, &bodies.specimen_b, -1.0);
         }
         structure.support(config);
+        structure.carry_sensors(config);
         structure
+    }
+
+    /// Adds the masses of the fixed sensors, as points, to the bodies that are present.
+    fn carry_sensors(&mut self, config: &RigConfig) {
+        for own in config.sensors.fixed.iter().filter(|own| own.mass_kg > 0.0) {
+            let point = config.responses.iter().find(|point| point.name == own.response);
+            let Some((point, (at, cg))) = point.and_then(|point| Some((point, self.find(point.body)?)))
+            else {
+                continue;
+            };
+            let moved = rigid_motion(point.position_m, cg);
+            let moved = moved.fixed_rows::<3>(0);
+            let mut block = self.mass.fixed_view_mut::<6, 6>(at, at);
+            block += moved.transpose() * moved * own.mass_kg;
+        }
     }
 
     /// Adds `sign` times the inertia of `part` to `body`, if it is present, as if they were one.

@@ -1,7 +1,9 @@
 //! Fixed vibrometers, and an operator who strikes.
 #![allow(clippy::unwrap_used)]
 
-use jointrig_hil_sim::rig::{CHANNELS, Configuration, Rig, RigConfig, RigError, Stepping};
+use jointrig_hil_sim::rig::config::{BodyName, FixedQuantity};
+use jointrig_hil_sim::rig::structure::Structure;
+use jointrig_hil_sim::rig::{CHANNELS, Channel, Configuration, Probe, Rig, RigConfig, RigError, Stepping};
 
 const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
 /// With six fixed vibrometers.
@@ -116,4 +118,68 @@ fn what_cannot_be_is_refused_by_name() {
                    units_per_volt = 0.005\nfloor = 0.0\n";
     let said = RigConfig::from_toml(&format!("{BY_HAND}{}", seventh.replace("[1, 0, 0]", "[1.0, 0.0, 0.0]")));
     assert!(said.unwrap_err().to_string().contains("room for 6"));
+}
+
+#[test]
+fn accelerometers_read_the_derivative_of_the_velocity() {
+    // a vibrometer and an accelerometer at the point that is hit, where the hammer's force acts on
+    // the reading directly
+    let mut config = exact();
+    config.sensors.left_out = vec!["vib_x".into(), "excitation".into()];
+    config.sensors.fixed.truncate(2);
+    for (own, quantity) in
+        config.sensors.fixed.iter_mut().zip([FixedQuantity::Velocity, FixedQuantity::Acceleration])
+    {
+        own.direction = [0.0, 0.0, 1.0];
+        own.quantity = quantity;
+        own.units_per_volt = if quantity == FixedQuantity::Velocity { 1e-3 } else { 20.0 };
+    }
+    for stepping in [Stepping::Fastest, Stepping::Exponential] {
+        let mut rig = Rig::with_stepping(&config, 3, stepping).unwrap();
+        let names: Vec<&str> = rig.channels().iter().map(|channel| channel.name.as_str()).collect();
+        assert_eq!(
+            names,
+            ["force", "vib_y", "vib_z", "ldv_a", "ldv_b", "lc_1", "lc_2", "lc_3", "a1_x", "a1_y"]
+        );
+        let steps: Vec<f64> = rig.channels().iter().map(Channel::step).collect();
+        rig.stage(Configuration::Ajb, "AZ1", "A1", 0).unwrap();
+        rig.fire(3.5e-3);
+        let record: Vec<[f64; 2]> = (0..4_000)
+            .map(|_| {
+                let mut codes = [0; 10];
+                rig.scan(&mut codes);
+                [8, 9].map(|place| f64::from(codes[place]) * steps[place])
+            })
+            .collect();
+        // Simpson's rule over two scans, whose error is that of modes above 10 kHz
+        let period_s = 1.0 / f64::from(rig.scan_rate_hz());
+        let mut left = 0.0_f64;
+        let largest = record.iter().map(|[velocity, _]| velocity.abs()).fold(0.0, f64::max);
+        for scan in record.windows(3) {
+            let gained = (scan[0][1] + 4.0 * scan[1][1] + scan[2][1]) * period_s / 3.0;
+            left = left.max((scan[2][0] - scan[0][0] - gained).abs());
+        }
+        assert!(largest > 1e-3 && left < 0.02 * largest, "{left} of {largest} m/s");
+    }
+}
+
+#[test]
+fn a_sensors_mass_is_part_of_the_structure() {
+    let mut config = RigConfig::default();
+    let bare = Structure::new(&config, Configuration::Ajb);
+    let text = "[[sensors.fixed]]\nname = \"a\"\nresponse = \"S1\"\ndirection = [1.0, 0.0, 0.0]\n\
+                units_per_volt = 1.0\nfloor = 0.0\nmass_kg = 0.01\n";
+    config.sensors.fixed = RigConfig::from_toml(text).unwrap().sensors.fixed;
+    let carrying = Structure::new(&config, Configuration::Ajb);
+    let at = Probe { body: BodyName::SpecimenA, position_m: [0.009, 0.002, 0.0], direction: [0.0, 0.0, 1.0] };
+    // what its point gains in mass: that of the sensor, for any motion of the body
+    let row = bare.row(&at).unwrap();
+    let moved = &row / row.norm_squared();
+    let gained = moved.dot(&((&carrying.mass - &bare.mass) * &moved));
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let mut direction = [0.0; 3];
+        direction[axis] = 1.0;
+        bare.row(&Probe { direction, ..at }).unwrap().dot(&moved)
+    });
+    assert!((gained - 0.01 * (x * x + y * y + z * z)).abs() < 1e-12, "{gained}");
 }

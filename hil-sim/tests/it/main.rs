@@ -21,4 +21,3 @@ mod stepping;
 mod supplies;
 mod support;
 mod sync;
-mod wakes;

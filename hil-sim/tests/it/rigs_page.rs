@@ -10,6 +10,8 @@ const DEFAULT: &str = include_str!("../../rigs/default.toml");
 const OWN: &str = include_str!("../../rigs/clamped-tips.toml");
 /// A rig with a manual hammer and fixed vibrometers.
 const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
+/// A rig with accelerometers instead of lasers.
+const ACCELEROMETERS: &str = include_str!("../../rigs/accelerometers.toml");
 
 /// Path of every field, with dots between table names; the tables of a list share one path.
 fn fields(path: &str, value: &Value, found: &mut BTreeSet<String>) {
@@ -54,6 +56,7 @@ fn the_page_and_the_rig_have_the_same_fields() {
     assert!(known.len() > 100, "{}", known.len());
     fields("", &toml::from_str(OWN).unwrap(), &mut known);
     fields("", &toml::from_str(BY_HAND).unwrap(), &mut known);
+    fields("", &toml::from_str(ACCELEROMETERS).unwrap(), &mut known);
     // fields that the example omits: every spring is in all configurations, and there is no load
     // cell
     known.extend(["structure.springs.in", "structure.load_cells_on"].map(String::from));

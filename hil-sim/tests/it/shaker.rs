@@ -8,6 +8,7 @@ use jointrig_hil_sim::rig::config::{ContactLaw, Errors};
 use jointrig_hil_sim::rig::{Rig, RigConfig};
 use jointrig_protocol::answer::{Answer, Refusal};
 use jointrig_protocol::event::{Event, Reason};
+use jointrig_protocol::limits::CHANNEL_CAPACITY;
 use jointrig_protocol::request::{Configuration, Control, Request, Shake};
 use jointrig_protocol::shot::Phase;
 use support::SmallHost;
@@ -113,7 +114,7 @@ fn vibrometers_calibrated_apart_leave_no_common_motion_in_what_is_held() {
             VirtualBoard::start_with(&config, &Options { seed: 4, ..Options::default() }).unwrap();
         let mut host = SmallHost::new(link);
         if let Some(told) = told {
-            let mut units_per_volt: heapless::Vec<f32, 16> = (0..host.channels as u8)
+            let mut units_per_volt: heapless::Vec<f32, CHANNEL_CAPACITY> = (0..host.channels as u8)
                 .map(|index| match host.ask(Request::Channel { index }) {
                     Ok(Answer::Channel(channel)) => channel.units_per_volt,
                     other => panic!("no channel but {other:?}"),

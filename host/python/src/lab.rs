@@ -4,8 +4,10 @@
 use crate::frf::Frf;
 use crate::interruptible::Stopped;
 use crate::record::Record;
+use crate::writing::{self, Stated};
 use crate::{in_the_process_that_loaded_this, interruptible, raised, values};
 use jointrig::analyse::{AnalyseError, CampaignFile, KnownContact, Wanted};
+use jointrig::campaign::plan::level::Level;
 use jointrig::campaign::plan::{configuration_named, structure};
 use jointrig::campaign::run::progress;
 use jointrig::campaign::store::Store;
@@ -22,7 +24,8 @@ use std::path::PathBuf;
 /// The default band of FRF lines, Hz.
 const BAND_HZ: (f64, f64) = (10.0, 1000.0);
 
-/// A campaign file, read only; it may be measured at the same time. Holds a path and no connection,
+/// A campaign file, opened read only for each request, so that it may be measured at the same time;
+/// adding hits and levels opens it for writing. Holds a path and no connection,
 /// so that it can be pickled.
 #[pyclass(module = "jointrig._native", frozen)]
 pub struct Lab {
@@ -129,6 +132,69 @@ impl Lab {
         })?;
         report::must_hold_something(&found).map_err(|sentence| raised::refused(py, &sentence))?;
         Ok(Analysis::of(found, Of::Campaign(self.path.clone())))
+    }
+
+    /// Adds the hits of one cell; jointrig's stub file describes the arguments.
+    #[pyo3(signature = (configuration, impact, response=None, *, fs_hz, channels, force_n=None, units=None, scale=None,
+                        delay_s=None, trigger_index=None, source="python", replace=false))]
+    #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
+    fn add_hits<'py>(
+        &self,
+        py: Python<'py>,
+        configuration: &str,
+        impact: &str,
+        response: Option<&str>,
+        fs_hz: f64,
+        channels: Bound<'py, PyDict>,
+        force_n: Option<Bound<'py, PyAny>>,
+        units: Option<Bound<'py, PyDict>>,
+        scale: Option<Bound<'py, PyDict>>,
+        delay_s: Option<Bound<'py, PyDict>>,
+        trigger_index: Option<usize>,
+        source: &str,
+        replace: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let given = Stated { force_n, channels, units, scale, delay_s }.given(py, &["hit", "sample"])?;
+        let cell = (configuration, impact, response);
+        let (added, verdicts) =
+            writing::add_hits(py, &self.path, cell, fs_hz, &given, trigger_index, source, replace)?;
+        let found = PyDict::new(py);
+        found.set_item("hits", added.hits)?;
+        found.set_item("kept", added.kept)?;
+        found.set_item("already", added.already)?;
+        found.set_item("verdicts", verdicts)?;
+        Ok(found)
+    }
+
+    /// Adds a level of the shaker; jointrig's stub file describes the arguments.
+    #[pyo3(signature = (frequency_hz, amplitude, *, fs_hz, channels, units=None, scale=None, delay_s=None, end_hz=None,
+                        held="displacement", when="before", source="python"))]
+    #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
+    fn add_level<'py>(
+        &self,
+        py: Python<'py>,
+        frequency_hz: f64,
+        amplitude: f64,
+        fs_hz: f64,
+        channels: Bound<'py, PyDict>,
+        units: Option<Bound<'py, PyDict>>,
+        scale: Option<Bound<'py, PyDict>>,
+        delay_s: Option<Bound<'py, PyDict>>,
+        end_hz: Option<f64>,
+        held: &str,
+        when: &str,
+        source: &str,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let given = Stated { force_n: None, channels, units, scale, delay_s }.given(py, &["sample"])?;
+        let held = held.parse().map_err(|what| raised::refused(py, &format!("held is `{held}`: {what}")))?;
+        let when = when.parse().map_err(|what| raised::refused(py, &format!("when is `{when}`: {what}")))?;
+        let level = Level { frequency_hz, end_hz, held, amplitude };
+        let added = writing::add_level(py, &self.path, level, when, fs_hz, &given, source)?;
+        let found = PyDict::new(py);
+        found.set_item("level", added.id)?;
+        found.set_item("reached", added.reached)?;
+        found.set_item("already", added.already)?;
+        Ok(found)
     }
 
     /// Writes results.json and report.html into `folder`.

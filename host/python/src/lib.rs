@@ -2,8 +2,8 @@
 //! possible here.
 //!
 //! All work runs with the interpreter released. Returned arrays are the memory that Rust filled,
-//! without a copy; an input signal is read once. Nothing writes into a campaign file, and no device
-//! can be opened: only the command moves a hammer.
+//! without a copy; an input signal is read once. Hits and levels are added to a campaign file by the
+//! same functions as the command's. No device can be opened: only the command moves a hammer.
 
 #![allow(clippy::needless_pass_by_value, reason = "Python hands arguments over by value")]
 
@@ -13,6 +13,7 @@ mod lab;
 mod raised;
 mod record;
 mod signals;
+mod writing;
 
 use pyo3::prelude::*;
 use std::process;
@@ -48,6 +49,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<record::Record>()?;
     module.add_class::<frf::Frf>()?;
     module.add_class::<lab::Analysis>()?;
+    module.add_function(wrap_pyfunction!(writing::new, module)?)?;
     module.add_function(wrap_pyfunction!(signals::frf, module)?)?;
     module.add_function(wrap_pyfunction!(signals::identify, module)?)?;
     module.add_function(wrap_pyfunction!(signals::hysteresis, module)?)?;

@@ -28,8 +28,8 @@ pub struct CellAverage {
     pub step_hz: f64,
     /// v_A, v_B and T at the contact, if requested and measured.
     pub contact: Option<CrossSpectra>,
-    /// The response, v_A, v_B and T with the heavy damping used for the contact, if requested and
-    /// measured.
+    /// The response, v_A and v_B if measured, and T, with the heavy damping used for the contact, if
+    /// requested and measured.
     pub damped: Option<CrossSpectra>,
     /// As `damped` but with the plan's light damping, used to correct the shaker's levels.
     pub light: Option<CrossSpectra>,
@@ -56,8 +56,40 @@ pub struct CellSums {
     groups: Vec<Group>,
     /// Number of channels of the response location.
     axes: usize,
-    /// Whether every hit had the signals at the contact.
-    at_contact: bool,
+    /// Number of signals at the contact that are summed.
+    summed: usize,
+    /// Which signals at the contact every hit had.
+    at_contact: AtContact,
+}
+
+/// The signals at the contact that the hits of a cell have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum AtContact {
+    /// v_A, v_B and T.
+    All,
+    /// T alone: no vibrometer measures next to the contact.
+    Force,
+    /// None, or not the same in all hits.
+    Nothing,
+}
+
+impl AtContact {
+    fn of(hit: &Hit) -> Self {
+        match (&hit.contact, &hit.load_cells) {
+            (Some(_), _) => AtContact::All,
+            (None, Some(_)) => AtContact::Force,
+            (None, None) => AtContact::Nothing,
+        }
+    }
+
+    /// Number of these signals.
+    fn count(self) -> usize {
+        match self {
+            AtContact::All => 3,
+            AtContact::Force => 1,
+            AtContact::Nothing => 0,
+        }
+    }
 }
 
 /// Hits with the same delays.
@@ -78,7 +110,8 @@ impl CellSums {
             records: Vec::new(),
             groups: Vec::new(),
             axes: 0,
-            at_contact: true,
+            summed: 0,
+            at_contact: AtContact::Nothing,
         }
     }
 
@@ -87,35 +120,39 @@ impl CellSums {
     /// # Errors
     /// A hit that does not match the others, or has no pulse.
     pub fn add(&mut self, hit: &Hit, fs_hz: f64) -> Result<(), SpectraError> {
+        let here = AtContact::of(hit);
         if self.records.is_empty() {
             self.axes = hit.response.len();
-            if hit.contact.is_none() {
-                // omitted if any hit lacks it
-                self.asked = Asked::default();
-            }
+            self.at_contact = here;
+            // omitted if any hit lacks it
+            self.asked.contact &= here == AtContact::All;
+            self.asked.damped &= here != AtContact::Nothing;
+            self.summed = if self.wants_contact() { here.count() } else { 0 };
+        }
+        if here != self.at_contact {
+            self.at_contact = AtContact::Nothing;
         }
         let mut delay_s = hit.response_delay_s.clone();
         let mut outputs: Vec<&[f64]> = hit.response.iter().map(Vec::as_slice).collect();
-        let nothing = match (self.wants_contact(), &hit.contact) {
-            (true, None) => vec![0.0; hit.force_n.len()],
-            _ => Vec::new(),
-        };
-        if self.wants_contact() {
-            if let Some(contact) = &hit.contact {
+        // a hit that lacks signals of the earlier ones keeps the number of outputs
+        let nothing = vec![0.0; if here.count() < self.summed { hit.force_n.len() } else { 0 }];
+        let signals: Vec<(f64, &[f64])> = match (&hit.contact, &hit.load_cells) {
+            (Some(contact), _) if self.summed == 3 => {
                 let ContactDelays { specimen_a, specimen_b, load_cells } = contact.delay_s;
-                delay_s.extend([specimen_a, specimen_b, load_cells]);
-                outputs.extend([
-                    &contact.specimen_a_m_per_s[..],
-                    &contact.specimen_b_m_per_s,
-                    &contact.tangential_n,
-                ]);
-            } else {
-                // omitted if any hit lacks it
-                self.at_contact = false;
-                delay_s.extend([0.0; 3]);
-                outputs.extend([&nothing[..]; 3]);
+                vec![
+                    (specimen_a, &contact.specimen_a_m_per_s),
+                    (specimen_b, &contact.specimen_b_m_per_s),
+                    (load_cells, &contact.tangential_n),
+                ]
             }
-        }
+            (Some(contact), _) if self.summed == 1 => {
+                vec![(contact.delay_s.load_cells, &contact.tangential_n)]
+            }
+            (None, Some(force)) if self.summed == 1 => vec![(force.delay_s, &force.tangential_n)],
+            _ => vec![(0.0, &nothing); self.summed],
+        };
+        delay_s.extend(signals.iter().map(|(delay_s, _)| delay_s));
+        outputs.extend(signals.iter().map(|(_, signal)| signal));
         let place = self.groups.iter().position(|group| group.delay_s == delay_s);
         let group = if let Some(place) = place {
             &mut self.groups[place]
@@ -149,18 +186,18 @@ impl CellSums {
         let all = self.together(|group| Some(group.light.finish(&group.delay_s)))?;
         let all = all.ok_or(SpectraError::NoHits)?;
         let force = self.together(|group| Some(group.light.force()))?.ok_or(SpectraError::NoHits)?;
-        let damped = if self.at_contact {
-            self.together(|group| group.damped.as_ref().map(|sums| sums.finish(&group.delay_s)))?
-        } else {
+        let damped = if self.at_contact == AtContact::Nothing {
             None
+        } else {
+            self.together(|group| group.damped.as_ref().map(|sums| sums.finish(&group.delay_s)))?
         };
-        let light = damped.is_some().then(|| all.band(LEVEL_LINES.low_hz, LEVEL_LINES.high_hz));
+        let spots = self.at_contact == AtContact::All;
+        let light = (damped.is_some() && spots).then(|| all.band(LEVEL_LINES.low_hz, LEVEL_LINES.high_hz));
         let step_hz = force.frequency_hz().get(1).copied().unwrap_or(0.0);
         let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
         let force_spectrum = force.force_spectrum().chunks(FORCE_LINES).map(mean).collect();
         let kept = all.band(self.lines_hz[0], self.lines_hz[1]);
-        let contact =
-            (self.asked.contact && self.at_contact).then(|| kept.of_outputs(self.axes..self.axes + 3));
+        let contact = (self.asked.contact && spots).then(|| kept.of_outputs(self.axes..self.axes + 3));
         Ok(CellAverage {
             spectra: kept.of_outputs(0..self.axes),
             name: self.name,

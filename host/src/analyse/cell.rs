@@ -9,7 +9,7 @@ use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::Band;
-use crate::substructuring::geometry::Geometry;
+use crate::substructuring::geometry::{Geometry, Grouping};
 
 /// One impact position with one response location.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,6 +60,17 @@ pub struct Hit {
     pub response_delay_s: Vec<f64>,
     /// The signals at the contact, if the rig has them.
     pub contact: Option<ContactSignals>,
+    /// The load cells' sum of a rig without vibrometers next to the contact.
+    pub load_cells: Option<LoadCellSignal>,
+}
+
+/// Sum of the load cells during one hit, where no vibrometers measure next to the contact.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LoadCellSignal {
+    /// Sum of the load cells, N.
+    pub tangential_n: Vec<f64>,
+    /// Its delay relative to the hammer's force, s.
+    pub delay_s: f64,
 }
 
 /// The signals at the contact during one hit.
@@ -73,6 +84,17 @@ pub struct ContactSignals {
     pub tangential_n: Vec<f64>,
     /// Their delays relative to the hammer's force.
     pub delay_s: ContactDelays,
+}
+
+/// Mass of a fixed sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorMass {
+    /// The response point that it is fixed to.
+    pub point: String,
+    /// The part that the point is on.
+    pub grouping: Grouping,
+    /// Its mass, kg.
+    pub mass_kg: f64,
 }
 
 /// A level of the shaker.
@@ -149,6 +171,16 @@ pub trait Measurements: Sync {
     /// Prior knowledge of positions, angles, gains and delays.
     fn contact_priors(&self) -> ContactPriors {
         ContactPriors::default()
+    }
+
+    /// Whether a sensor is fixed to this response point; otherwise the vibrometer visits it.
+    fn is_fixed(&self, _point: &str) -> bool {
+        false
+    }
+
+    /// The masses of the fixed sensors, as far as the plan states them.
+    fn sensor_masses(&self) -> Vec<SensorMass> {
+        Vec::new()
     }
 
     /// Standard deviation of this response point's position along each axis, m; `None` if the

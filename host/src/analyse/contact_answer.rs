@@ -3,7 +3,7 @@
 use super::averages::CellAverage;
 use super::cell::{CellName, Measurements};
 use crate::contact;
-use crate::contact::{BAND, ContactCell, ContactError, Input, Known, Stiffness, read};
+use crate::contact::{Axes, BAND, ContactCell, ContactError, Input, Known, Stiffness, read};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
@@ -18,10 +18,7 @@ pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
     }
     let points = geometry.points(name.configuration);
     let mut own = points.channels.iter().filter(|p| p.name == name.response);
-    // the contact's signals and the vibrometers on the specimens are along z, and the estimator
-    // needs the motion along x, y and z
-    let usual = own.clone().map(|p| p.direction).eq([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    let served = usual && own.any(|p| contact::serves(p.grouping));
+    let served = own.any(|p| contact::serves(p.grouping));
     let hit = points.impacts.iter().find(|p| p.name == name.impact);
     served
         && hit.is_some_and(|p| match name.configuration {
@@ -45,7 +42,7 @@ pub fn answer<M: Measurements>(
         let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
         return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
     }
-    read(&input(measurements, cells)?)
+    read(&input(measurements, cells))
 }
 
 /// The cells that have these spectra.
@@ -59,7 +56,8 @@ pub fn cells<'a, M: Measurements>(
         let spectra = spectra(average)?;
         let points = geometry.points(average.name.configuration);
         let impact = points.impacts.iter().find(|p| p.name == average.name.impact)?;
-        let point = points.channels.iter().find(|p| p.name == average.name.response)?;
+        let own = || points.channels.iter().filter(|p| p.name == average.name.response);
+        let point = own().next()?;
         Some(ContactCell {
             structure: average.name.configuration,
             impact: &impact.name,
@@ -70,6 +68,9 @@ pub fn cells<'a, M: Measurements>(
             point_m: point.position_m,
             point_sigma_m: measurements.point_sigma_m(&point.name),
             point_grouping: point.grouping,
+            axes: Axes::new(&own().map(|p| p.direction).collect::<Vec<_>>())?,
+            fixed: measurements.is_fixed(&point.name),
+            records: &average.records,
             spectra,
             quantity: measurements.quantity(),
         })
@@ -78,18 +79,12 @@ pub fn cells<'a, M: Measurements>(
 }
 
 /// Input of the contact identification.
-///
-/// # Errors
-/// The plan does not state the vibrometers' points near the contact.
-pub fn input<'a, M: Measurements>(
-    measurements: &M,
-    cells: Vec<ContactCell<'a>>,
-) -> Result<Input<'a>, ContactError> {
-    Ok(Input {
+pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>) -> Input<'a> {
+    Input {
         cells,
         contact_m: measurements.geometry().virtual_point_b_m,
-        spots_m: measurements.spots_m().ok_or(ContactError::NoSpots)?,
+        spots_m: measurements.spots_m(),
         priors: measurements.contact_priors(),
         band_hz: BAND,
-    })
+    }
 }

@@ -6,7 +6,7 @@ use super::averages::CellAverage;
 use super::cell::Measurements;
 use super::cells_stage::{Cells, slip_under_the_hammer};
 use super::checks::contact_change::ContactChange;
-use super::checks::{HiddenResonance, SeriesCompliance, at_the_specimens};
+use super::checks::{HiddenResonance, SensorMasses, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{ImpactLoop, ImpactLoops};
 use super::missing::Missing;
 use super::shaker_levels::RecordLoops;
@@ -61,6 +61,8 @@ pub struct Contact {
     pub series: SeriesCompliance,
     /// Comparison of the levels before and after the hammer's cells.
     pub change: Option<ContactChange>,
+    /// What the masses of fixed sensors change.
+    pub masses: Option<SensorMasses>,
 }
 
 /// Runs this stage. `between_the_arms` is the stiffness from FBS, `own` the contact stiffness from
@@ -129,6 +131,7 @@ pub fn at_the_contact<M: Measurements>(
         backbones: shaker_levels::backbones(&steady),
         series: SeriesCompliance::of(between_the_arms, at_the_specimens),
         change: ContactChange::of(&steady),
+        masses: SensorMasses::of(measurements, averages),
         joint: shaker_levels::combined_with_hits(own, &at_levels),
         levels: shaker_levels::loops(steady, arm.as_ref(), at_levels),
     };

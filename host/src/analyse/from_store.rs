@@ -5,11 +5,13 @@
 use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
-use super::cell::{CellName, ContactDelays, Hit, KnownContact, Measurements, Progress, ShakerLevel, Wanted};
+use super::cell::{
+    CellName, ContactDelays, Hit, KnownContact, Measurements, Progress, SensorMass, ShakerLevel, Wanted,
+};
 use super::chosen::DataQuality;
 use super::findings::Findings;
 use super::plan_geometry::{geometry, places};
-use crate::campaign::plan::{Plan, structure};
+use crate::campaign::plan::{Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
@@ -28,7 +30,7 @@ use crate::results::{Calibrated, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
 use crate::substructuring::Frf;
-use crate::substructuring::geometry::Geometry;
+use crate::substructuring::geometry::{Geometry, Grouping};
 use jointrig_protocol::channel::{Quantity, Role};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -353,6 +355,13 @@ impl CampaignFile {
         hit.of_row = record.cell != cell.id;
         hit.response.resize_with(responses.len(), Vec::new);
         hit.response_delay_s = responses.iter().map(|place| late(*place)).collect();
+        let only_force = contact && at_contact.is_none() && !cells.is_empty();
+        hit.load_cells = only_force.then(|| {
+            let mut signal = hit.load_cells.take().unwrap_or_default();
+            signal.tangential_n.clear();
+            signal.delay_s = late(cells[0].0);
+            signal
+        });
         hit.contact = at_contact.map(|(a, b)| {
             let mut signals = hit.contact.take().unwrap_or_default();
             signals.tangential_n.clear();
@@ -364,7 +373,10 @@ impl CampaignFile {
         // unpack only the channels that are needed
         let mut wanted: Vec<usize> = std::iter::once(force).chain(responses.iter().copied()).collect();
         if let Some((a, b)) = at_contact {
-            wanted.extend([a, b].into_iter().chain(cells.iter().map(|(place, _)| *place)));
+            wanted.extend([a, b]);
+        }
+        if at_contact.is_some() || only_force {
+            wanted.extend(cells.iter().map(|(place, _)| *place));
         }
         let mut seen = HashSet::new();
         wanted.retain(|place| seen.insert(*place));
@@ -379,17 +391,23 @@ impl CampaignFile {
             for (signal, _) in hit.response.iter_mut().zip(&responses).filter(|(_, own)| **own == place) {
                 write(signal);
             }
-            let (Some((a, b)), Some(signals)) = (at_contact, &mut hit.contact) else { return };
-            if place == a {
-                write(&mut signals.specimen_a_m_per_s);
-            }
-            if place == b {
-                write(&mut signals.specimen_b_m_per_s);
-            }
+            let tangential_n = match (at_contact, &mut hit.contact, &mut hit.load_cells) {
+                (Some((a, b)), Some(signals), _) => {
+                    if place == a {
+                        write(&mut signals.specimen_a_m_per_s);
+                    }
+                    if place == b {
+                        write(&mut signals.specimen_b_m_per_s);
+                    }
+                    &mut signals.tangential_n
+                }
+                (None, _, Some(signal)) => &mut signal.tangential_n,
+                _ => return,
+            };
             for (_, part) in cells.iter().filter(|(own, _)| *own == place) {
-                signals.tangential_n.resize(samples.len(), 0.0);
+                tangential_n.resize(samples.len(), 0.0);
                 let units = map.units(place, samples.of()).unwrap_or(0.0);
-                samples.put(&mut signals.tangential_n, |sum, sample| *sum += part * (sample * units));
+                samples.put(tangential_n, |sum, sample| *sum += part * (sample * units));
             }
         })?;
         Ok(rate)
@@ -461,6 +479,22 @@ impl Measurements for CampaignFile {
     fn point_sigma_m(&self, point: &str) -> Option<f64> {
         let mut points = self.plan.geometry.response.iter().map(toml::Spanned::get_ref);
         points.find(|own| own.name == point)?.sigma_m
+    }
+
+    fn is_fixed(&self, point: &str) -> bool {
+        self.plan.own_channels(point).is_some()
+    }
+
+    fn sensor_masses(&self) -> Vec<SensorMass> {
+        let points = self.plan.geometry.response.iter().map(toml::Spanned::get_ref);
+        let own = |point: &ResponsePoint| {
+            Some(SensorMass {
+                point: point.name.clone(),
+                grouping: Grouping::try_from(point.grouping).ok()?,
+                mass_kg: 1e-3 * point.mass_g?,
+            })
+        };
+        points.filter_map(own).collect()
     }
 
     fn shaker_levels(&self) -> (Vec<ShakerLevel>, Vec<String>) {

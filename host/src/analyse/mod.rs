@@ -20,6 +20,8 @@ mod chosen;
 mod configuration_stage;
 mod contact_answer;
 mod contact_stage;
+#[cfg(feature = "sim")]
+pub mod expected;
 mod findings;
 mod from_frfs;
 mod from_store;
@@ -36,7 +38,10 @@ mod shaker_levels_tests;
 pub use averages::LINES_HZ;
 pub use campaign::analyse_measurements;
 pub use cell::{BANDS, Progress, Wanted};
-pub use cell::{Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, Measurements, ShakerLevel};
+pub use cell::{
+    Cell, CellName, ContactDelays, ContactSignals, Hit, KnownContact, LoadCellSignal, Measurements,
+    SensorMass, ShakerLevel,
+};
 pub use contact_stage::Contact;
 pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use from_frfs::{Fit, NoFit, fits};

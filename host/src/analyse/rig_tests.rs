@@ -245,6 +245,7 @@ impl Measurements for Rig {
                     response: response.to_vec(),
                     response_delay_s: vec![0.0; 3],
                     contact,
+                    load_cells: None,
                 }
             })
             .for_each(|hit| look(&hit, FS_HZ));

@@ -242,7 +242,10 @@ pub fn k_t_of_levels<M: Measurements>(
         return all(NoLevelStiffness::Doubted);
     }
     let light = cells(measurements, averages, |average| average.light.as_ref());
-    let Ok(light) = input(measurements, light) else { return all(NoLevelStiffness::NoContact) };
+    let light = input(measurements, light);
+    if light.spots_m.is_none() {
+        return all(NoLevelStiffness::NoContact);
+    }
     let usable: Vec<Result<SteadyLevel, NoLevelStiffness>> =
         levels.iter().map(|(level, raw)| steady(level, raw)).collect();
     let read: Vec<SteadyLevel> = usable.iter().filter_map(|level| level.as_ref().ok().cloned()).collect();

@@ -19,6 +19,7 @@
 //! ([`verdict::judge`](mod@verdict::judge)) and stored on a separate thread (`run/keeper.rs`).
 
 pub mod archive;
+pub mod cut;
 pub mod import;
 pub mod plan;
 pub mod recheck;

@@ -75,7 +75,8 @@ fn sync_line(sync: &Sync) -> String {
 /// Show a device: handshake, channels, firmware version, counters.
 #[derive(Debug, Args)]
 pub struct Info {
-    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000,
+    /// "bridge:python my_daq.py".
     #[arg(long, value_name = "ADDR")]
     device: String,
     /// Folder with the tables that decode the controller's log lines [default: that of the

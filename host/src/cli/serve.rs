@@ -33,7 +33,8 @@ pub struct Serve {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig", required_unless_present = "device")]
     file: Option<PathBuf>,
-    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000,
+    /// "bridge:python my_daq.py".
     #[arg(long, value_name = "ADDR")]
     device: Option<String>,
     /// Port on 127.0.0.1; 0 chooses a free one.
@@ -87,7 +88,7 @@ fn show_channels(device: &str, page: Page) -> Result<(), CliError> {
     let channels = session.channels(&info)?;
     let simulated = is_simulated_board(&info.board);
     onlooker.watch.saw(&Seen::Stream { channels: &channels, simulated });
-    let (_, first) = session.start(channels.len())?;
+    let (_, first) = session.start(&channels)?;
     tell_line!("nothing is struck and nothing moves; Ctrl-C ends");
     let (begun, mut told) = (Instant::now(), Instant::now());
     while !stop.load(Ordering::Relaxed) {

@@ -36,7 +36,8 @@ pub struct Shaker {
     /// The campaign file.
     #[arg(value_name = "FILE.jrig")]
     file: PathBuf,
-    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000.
+    /// Device address, e.g. sim:, usb:, serial:/dev/ttyACM0, tcp:127.0.0.1:4000,
+    /// "bridge:python my_daq.py".
     #[arg(long, value_name = "ADDR")]
     device: String,
     /// Frequencies, Hz [default: those of the plan].

@@ -7,16 +7,15 @@
 //! | `tcp:HOST:PORT` | a socket |
 //! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, with the built-in rig |
 //! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one, or by serial |
+//! | `bridge:COMMAND` | a program that writes a recorder's blocks of samples to its standard output |
+//! | `bridge:tcp:HOST:PORT` | such a program on another computer |
 //! | `replay:` | known, but not supported by this version |
-//!
-//! `tcp:HOST:PORT`: a device connected by a socket (a virtual board, or a bridge).
 
 use super::error::DeviceError;
 #[cfg(feature = "sim")]
 use super::sim::Sim;
-use super::transport::{Simulated, Transport};
-use std::io::{Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use super::tcp::Tcp;
+use super::transport::{Recorder, Simulated, Transport};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -39,12 +38,30 @@ pub enum Address {
     },
     /// A socket, as `host:port`.
     Tcp(String),
+    /// A recorder's blocks of samples.
+    Bridge(BridgeSource),
     /// The emulator.
     Qemu {
         /// The firmware image for the emulated board; `None` for the one named by the environment
         /// or built by cargo.
         image: Option<PathBuf>,
     },
+}
+
+/// Where a recorder's blocks of samples come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BridgeSource {
+    /// The standard output of a program, started with this command line.
+    Command(String),
+    /// A socket, as `host:port`.
+    Tcp(String),
+}
+
+/// Whether `place` is `host:port`.
+fn is_place(place: &str) -> bool {
+    place
+        .rsplit_once(':')
+        .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0))
 }
 
 impl FromStr for Address {
@@ -60,15 +77,19 @@ impl FromStr for Address {
             "serial" if rest.is_empty() => Err(wrong("name the port, e.g. serial:/dev/ttyACM0")),
             "serial" => Ok(Self::Serial(rest.into())),
             "usb" => Ok(Self::Usb { serial: (!rest.is_empty()).then(|| rest.into()) }),
-            "tcp" => match rest.rsplit_once(':') {
-                Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0) => {
-                    Ok(Self::Tcp(rest.into()))
+            "tcp" if is_place(rest) => Ok(Self::Tcp(rest.into())),
+            "tcp" => Err(wrong("name host and port (1 to 65535), e.g. tcp:127.0.0.1:4000")),
+            "bridge" => match rest.strip_prefix("tcp:") {
+                Some(place) if is_place(place) => Ok(Self::Bridge(BridgeSource::Tcp(place.into()))),
+                Some(_) => Err(wrong("name host and port (1 to 65535), e.g. bridge:tcp:192.168.1.7:4001")),
+                None if rest.trim().is_empty() => {
+                    Err(wrong("name the program that writes the samples, e.g. \"bridge:python my_daq.py\""))
                 }
-                _ => Err(wrong("name host and port (1 to 65535), e.g. tcp:127.0.0.1:4000")),
+                None => Ok(Self::Bridge(BridgeSource::Command(rest.into()))),
             },
             "qemu" => Ok(Self::Qemu { image: (!rest.is_empty()).then(|| rest.into()) }),
             "replay" => Err(DeviceError::NotBuilt { given: given.into(), scheme: scheme.into() }),
-            _ => Err(wrong("known are sim:, serial:, usb:, tcp: and qemu:")),
+            _ => Err(wrong("known are sim:, serial:, usb:, tcp:, bridge: and qemu:")),
         }
     }
 }
@@ -81,6 +102,8 @@ impl fmt::Display for Address {
             Self::Serial(path) => write!(f, "serial:{}", path.display()),
             Self::Usb { serial } => write!(f, "usb:{}", serial.as_deref().unwrap_or_default()),
             Self::Tcp(place) => write!(f, "tcp:{place}"),
+            Self::Bridge(BridgeSource::Command(command)) => write!(f, "bridge:{command}"),
+            Self::Bridge(BridgeSource::Tcp(place)) => write!(f, "bridge:tcp:{place}"),
             Self::Qemu { image: None } => f.write_str("qemu:"),
             Self::Qemu { image: Some(path) } => write!(f, "qemu:{}", path.display()),
         }
@@ -99,9 +122,21 @@ impl Address {
             Self::Serial(path) => Ok(Box::new(super::serial::Serial::open(path)?)),
             Self::Usb { serial } => Ok(Box::new(super::usb::Usb::open(serial.as_deref())?)),
             Self::Tcp(place) => Ok(Box::new(Tcp::open(place)?)),
+            Self::Bridge(source) => open_bridge(source),
             Self::Qemu { image } => open_qemu(image.as_deref(), seed),
         }
     }
+}
+
+#[cfg(feature = "bridge")]
+fn open_bridge(source: &BridgeSource) -> Result<Box<dyn Transport>, DeviceError> {
+    Ok(Box::new(super::bridge::BridgedRecorder::open(source)?))
+}
+
+#[cfg(not(feature = "bridge"))]
+fn open_bridge(source: &BridgeSource) -> Result<Box<dyn Transport>, DeviceError> {
+    let given = Address::Bridge(source.clone()).to_string();
+    Err(DeviceError::NotBuilt { given, scheme: "bridge".into() })
 }
 
 #[cfg(feature = "sim")]
@@ -150,60 +185,13 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
     fn simulated(&self) -> Option<Simulated> {
         (**self).simulated()
     }
-}
 
-const CONNECT_PATIENCE: Duration = Duration::from_secs(3);
-
-/// An open socket.
-pub struct Tcp {
-    stream: TcpStream,
-    timeout: Option<Duration>,
-}
-
-impl Tcp {
-    /// Connects to `place`, given as `host:port`.
-    ///
-    /// # Errors
-    /// [`DeviceError::Open`] with the cause and what to do.
-    pub fn open(place: &str) -> Result<Self, DeviceError> {
-        let open = |why: String| DeviceError::Open { address: format!("tcp:{place}"), why };
-        let mut last = None;
-        for address in place.to_socket_addrs().map_err(|error| open(error.to_string()))? {
-            match TcpStream::connect_timeout(&address, CONNECT_PATIENCE) {
-                Ok(stream) => {
-                    stream.set_nodelay(true).map_err(|error| open(error.to_string()))?;
-                    return Ok(Self { stream, timeout: None });
-                }
-                Err(error) => last = Some(error),
-            }
-        }
-        let why = last.map_or_else(|| "the name has no address".into(), |error| error.to_string());
-        Err(open(format!("{why}: is the device (or `jointrig-hil-sim serve --tcp`) running there?")))
-    }
-}
-
-impl Transport for Tcp {
-    fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        if self.timeout != Some(timeout) {
-            self.stream.set_read_timeout(Some(timeout))?;
-            self.timeout = Some(timeout);
-        }
-        match self.stream.read(buf) {
-            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
-                ) =>
-            {
-                Ok(0)
-            }
-            other => other,
-        }
+    fn recorder(&self) -> Option<Recorder> {
+        (**self).recorder()
     }
 
-    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.stream.write_all(bytes)
+    fn take_remarks(&mut self) -> Vec<String> {
+        (**self).take_remarks()
     }
 }
 
@@ -221,6 +209,8 @@ mod tests {
             "usb:0034001A3433510437363934",
             "tcp:127.0.0.1:4000",
             "tcp:[::1]:9",
+            "bridge:python my_daq.py --rate 25600",
+            "bridge:tcp:192.168.1.7:4001",
             "qemu:",
             "qemu:x.elf",
         ] {
@@ -236,6 +226,8 @@ mod tests {
             ("serial:", "name the port"),
             ("tcp:localhost", "host and port"),
             ("tcp:localhost:0", "host and port"),
+            ("bridge:", "bridge:python my_daq.py"),
+            ("bridge:tcp:localhost", "bridge:tcp:192.168.1.7:4001"),
             ("bluetooth:x", "known are"),
             ("replay:x.bin", "not built into this version"),
         ] {

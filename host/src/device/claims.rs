@@ -3,10 +3,10 @@
 //! anything moves and before anything is stored.
 
 use jointrig_protocol::answer::{Answer, Counters, Info, Status};
-use jointrig_protocol::channel::Channel;
+use jointrig_protocol::channel::{Channel, WIDE_BITS};
 use jointrig_protocol::event::{self, Event};
 use jointrig_protocol::hello::Hello;
-use jointrig_protocol::limits::{COIL_PULSE_CAP_US, MAX_CHANNELS};
+use jointrig_protocol::limits::{CHANNEL_CAPACITY, COIL_PULSE_CAP_US};
 use jointrig_protocol::shot::Shot;
 use jointrig_protocol::slow::Slow;
 
@@ -20,8 +20,9 @@ const RATE_HZ: std::ops::RangeInclusive<u32> = 100..=2_000_000;
 /// Largest scan index: 285 years at a million scans per second. Sums of such indices stay exact.
 pub(super) const LAST_SCAN: u64 = 1 << 53;
 
-/// The widest range of a converter, V.
-const RANGE_V: f32 = 1000.0;
+/// The widest range of a channel, V, or in the unit of the samples of a recorder that delivers
+/// engineering units (1 GN).
+const RANGE_V: f32 = 1e9;
 
 /// Longest delay of a signal, ns.
 const DELAY_NS: u32 = 1_000_000_000;
@@ -51,8 +52,8 @@ pub(super) fn of_hello(hello: &Hello) -> Claim {
 /// Checks the device's description.
 pub(super) fn of_info(info: &Info, hello: &Hello) -> Claim {
     let Info { channels, scan_rate_hz, ring_scans, coil_cap_us, drive_v, .. } = *info;
-    refuse((1..=MAX_CHANNELS).contains(&usize::from(channels)), || {
-        format!("says that a scan has {channels} channels: 1 to {MAX_CHANNELS} are possible")
+    refuse((1..=CHANNEL_CAPACITY).contains(&usize::from(channels)), || {
+        format!("says that a scan has {channels} channels: 1 to {CHANNEL_CAPACITY} are possible")
     })?;
     refuse(RATE_HZ.contains(&scan_rate_hz), || {
         format!(
@@ -93,7 +94,9 @@ pub(super) fn of_channel(channel: &Channel, before: &[Channel]) -> Claim {
     refuse(delay_ns <= DELAY_NS, || {
         format!("says that `{name}` lags by {delay_ns} ns: at most {DELAY_NS} are possible")
     })?;
-    refuse((1..=32).contains(&bits), || format!("says that `{name}` has {bits} bits: 1 to 32 are possible"))
+    refuse((1..=WIDE_BITS).contains(&bits), || {
+        format!("says that `{name}` has {bits} bits: 1 to {WIDE_BITS} are possible")
+    })
 }
 
 /// Checks the slow values.

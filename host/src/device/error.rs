@@ -32,7 +32,7 @@ pub enum DeviceError {
     },
     /// The address has a known form that this build does not support.
     #[error(
-        "device address `{given}`: `{scheme}:` is not built into this version; use sim:, serial:, usb: or tcp:"
+        "device address `{given}`: `{scheme}:` is not built into this version; use serial:, usb: or tcp:"
     )]
     NotBuilt {
         /// The address given.

@@ -12,7 +12,7 @@ use jointrig_protocol::sync::{ClockFault, Edge, Line};
 
 use super::claims::{self, Claim};
 use super::logs::DeviceLog;
-use super::stream::Stream;
+use super::stream::{ScanLayout, Stream};
 use super::tap::Tap;
 
 /// Most events that wait to be read; the oldest are dropped.
@@ -76,8 +76,8 @@ pub struct Inbox {
 pub struct Starting {
     /// The request's number.
     pub number: u32,
-    /// Channels in a scan.
-    pub channels: usize,
+    /// The words of a scan.
+    pub layout: ScanLayout,
     /// Scans that the device can send again.
     pub ring_scans: u32,
     /// Scans per second, Hz.
@@ -125,8 +125,8 @@ impl Inbox {
         if let Ok(Answer::Started { epoch, map, first_scan }) = answer.outcome
             && let Some(starting) = self.starting.take_if(|starting| starting.number == answer.number)
         {
-            let Starting { channels, ring_scans, rate_hz, .. } = starting;
-            let mut stream = Stream::new(epoch, map, first_scan, channels, ring_scans);
+            let Starting { layout, ring_scans, rate_hz, .. } = starting;
+            let mut stream = Stream::new(epoch, map, first_scan, layout, ring_scans);
             stream.tapped(self.tap.take(), rate_hz);
             self.stream = Some(stream);
         }

@@ -44,6 +44,11 @@ impl Link {
         self.bad
     }
 
+    /// The transport.
+    pub fn transport(&mut self) -> &mut dyn Transport {
+        &mut *self.transport
+    }
+
     /// Passes every available frame to `take`, waiting at most `timeout` for the first byte.
     /// Returns whether any byte arrived.
     pub fn receive(&mut self, timeout: Duration, mut take: impl FnMut(Frame<'_>)) -> io::Result<bool> {

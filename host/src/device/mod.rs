@@ -5,6 +5,8 @@
 //! one impact cut from it. A [`tap`] lets another thread view the stream.
 
 pub mod address;
+#[cfg(feature = "bridge")]
+mod bridge;
 pub mod channels;
 mod claims;
 pub mod error;
@@ -21,5 +23,6 @@ pub mod session;
 mod sim;
 pub mod stream;
 pub mod tap;
+mod tcp;
 pub mod transport;
 pub mod usb;

@@ -13,12 +13,12 @@ use super::error::DeviceError;
 use super::inbox::Starting;
 use super::samples::Samples;
 use super::session::{Session, TRIES, patience};
-use super::stream::{Accounts, Stream};
+use super::stream::{Accounts, ScanLayout, Stream};
 use super::tap::Tap;
 use jointrig_protocol::answer::{Answer, Info, Shaker, Status};
 use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::frame::Kind;
-use jointrig_protocol::limits::MAX_CHANNELS;
+use jointrig_protocol::limits::CHANNEL_CAPACITY;
 use jointrig_protocol::request::{Fire, Numbered, Request, Shake, Stage, Trigger};
 use jointrig_protocol::slow::Slow;
 use jointrig_protocol::sync::{Clock, ClockFault, Edge, Sync};
@@ -131,7 +131,9 @@ impl Session {
                 other => return Err(self.wrong("channel", &other)),
             }
         }
-        Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, exact_hz: None, channels })
+        let exact_hz = self.recorder().map(|recorder| recorder.rate_hz);
+        let exact_hz = exact_hz.filter(|rate| *rate != f64::from(info.scan_rate_hz));
+        Ok(ChannelMap { id: 0, rate_hz: info.scan_rate_hz, exact_hz, channels })
     }
 
     /// Makes the device apply the scales of these channels to trigger, quiet check, limits and
@@ -144,7 +146,7 @@ impl Session {
     pub fn calibrate(&mut self, device: &ChannelMap, calibrated: &ChannelMap) -> Result<(), DeviceError> {
         fn scales(map: &ChannelMap) -> impl Iterator<Item = f32> {
             // no device has more channels than a request has scales
-            map.channels.iter().take(MAX_CHANNELS).map(|channel| channel.units_per_volt)
+            map.channels.iter().take(CHANNEL_CAPACITY).map(|channel| channel.units_per_volt)
         }
         if scales(device).eq(scales(calibrated)) && !self.scaled {
             return Ok(());
@@ -195,12 +197,13 @@ impl Session {
     }
 
     /// Starts a new stream of scans of `channels` channels; returns its epoch and first scan.
-    pub fn start(&mut self, channels: usize) -> Result<(u32, u64), DeviceError> {
+    pub fn start(&mut self, layout: impl Into<ScanLayout>) -> Result<(u32, u64), DeviceError> {
         if let Some(tap) = self.inbox.stream.take().and_then(Stream::into_tap) {
             self.inbox.tap = Some(tap);
         }
         let (ring_scans, rate_hz) = (self.hello().ring_scans, self.rate_hz);
-        self.inbox.starting = Some(Starting { number: self.next_number, channels, ring_scans, rate_hz });
+        let (number, layout) = (self.next_number, layout.into());
+        self.inbox.starting = Some(Starting { number, layout, ring_scans, rate_hz });
         match self.ask(Request::Start)? {
             Answer::Started { epoch, first_scan, .. } => Ok((epoch, first_scan)),
             other => Err(self.wrong("start", &other)),

@@ -32,7 +32,7 @@ use super::inbox::Inbox;
 use super::link::Link;
 use super::logs::{DeviceLog, Tables};
 use super::stream::{Accounts, Stream};
-use super::transport::{Simulated, Transport};
+use super::transport::{Recorder, Simulated, Transport};
 
 /// The line counts as idle when nothing arrived for this long.
 const IDLE: Duration = Duration::from_millis(20);
@@ -157,6 +157,16 @@ impl Session {
     /// The rig's description when the device is simulated in this process.
     pub fn simulated(&self) -> Option<&Simulated> {
         self.simulated.as_ref()
+    }
+
+    /// What is known about a recorder whose samples come over a bridge.
+    pub fn recorder(&mut self) -> Option<Recorder> {
+        self.link.transport().recorder()
+    }
+
+    /// Sentences about such a recorder since the last call, each of which a person should read.
+    pub fn remarks(&mut self) -> Vec<String> {
+        self.link.transport().take_remarks()
     }
 
     /// The device's name in errors.

@@ -4,13 +4,15 @@
 //! names the missing scans, so that the session can request them; scans that the device reports as
 //! lost for good are recorded as a lost range, and the stream continues after it.
 //!
-//! Up to here codes are kept one scan after another, as the link delivers them. [`Stream::cut`] takes
+//! Up to here 16-bit words are kept one scan after another, as the link delivers them. [`Stream::cut`] takes
 //! a part of the stream out of it one channel after another, as everything above uses it; a
 //! [`Recording`] is the part around one impact.
 
-use super::samples::{ChannelView, Samples};
+use super::channels::ChannelMap;
+use super::samples::{ChannelSamples, ChannelView, Samples};
 use super::tap::Tap;
 use jointrig_protocol::block::{Block, RESENT};
+use jointrig_protocol::channel::{NARROW_BITS, joined_code, words_per_scan};
 use jointrig_protocol::shot::Shot;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -43,12 +45,69 @@ const TAPE_KEPT: u64 = 1 << 27;
 /// Most ranges of lost scans that wait for the scans before them.
 const GONE_KEPT: usize = 4096;
 
+/// What the 16-bit words of a scan are: one for each channel, and after the last one a second word
+/// for each wide channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScanLayout {
+    /// Bits of each channel.
+    bits: Vec<u8>,
+    words: usize,
+}
+
+impl From<&ChannelMap> for ScanLayout {
+    fn from(map: &ChannelMap) -> Self {
+        Self {
+            bits: map.channels.iter().map(|channel| channel.bits).collect(),
+            words: words_per_scan(&map.channels),
+        }
+    }
+}
+
+/// As many channels of 16 bits.
+impl From<usize> for ScanLayout {
+    fn from(channels: usize) -> Self {
+        Self { bits: vec![16; channels], words: channels }
+    }
+}
+
+impl ScanLayout {
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.bits.len()
+    }
+
+    /// 16-bit words per scan.
+    pub fn words(&self) -> usize {
+        self.words
+    }
+
+    /// `scans` samples of each channel, of which those from `at` on are in `words` (whole scans, one
+    /// after another) and the others are 0.
+    pub fn samples(&self, scans: usize, at: usize, words: &[i16]) -> Samples {
+        let mut lower = self.bits.len()..;
+        let mut of = |(place, bits): (usize, &u8)| {
+            let own = |word: usize| words.iter().skip(word).step_by(self.words).copied();
+            if *bits <= NARROW_BITS {
+                let mut codes = vec![0; scans];
+                codes.iter_mut().skip(at).zip(own(place)).for_each(|(code, own)| *code = own);
+                return ChannelSamples::I16(codes);
+            }
+            let both = own(place).zip(own(lower.next().unwrap_or(place)));
+            let mut codes = vec![0; scans];
+            let joined = both.map(|(upper, lower)| joined_code([upper, lower], *bits));
+            codes.iter_mut().skip(at).zip(joined).for_each(|(code, own)| *code = own);
+            ChannelSamples::I32(codes)
+        };
+        Samples::new(self.bits.iter().enumerate().map(&mut of).collect()).expect("all have `scans` samples")
+    }
+}
+
 /// A stream being assembled.
 pub struct Stream {
     epoch: u32,
     map: u8,
     first_scan: u64,
-    channels: usize,
+    layout: ScanLayout,
     /// Most scans that are held ahead of a gap, and the widest gap that is filled with zeros.
     bound: u64,
     expected: u64,
@@ -72,14 +131,14 @@ struct Held {
 }
 
 impl Stream {
-    /// An empty stream of `channels` channels whose first scan is `first_scan`; `ring_scans` is the
-    /// number of scans that the device can send again.
-    pub fn new(epoch: u32, map: u8, first_scan: u64, channels: usize, ring_scans: u32) -> Self {
+    /// An empty stream whose scans have this layout and whose first scan is `first_scan`;
+    /// `ring_scans` is the number of scans that the device can send again.
+    pub fn new(epoch: u32, map: u8, first_scan: u64, layout: impl Into<ScanLayout>, ring_scans: u32) -> Self {
         Self {
             epoch,
             map,
             first_scan,
-            channels,
+            layout: layout.into(),
             bound: 4 * u64::from(ring_scans.max(1)),
             expected: first_scan,
             newest: first_scan,
@@ -99,7 +158,7 @@ impl Stream {
     pub fn tapped(&mut self, tap: Option<Tap>, rate_hz: f64) {
         self.tap = tap;
         if let Some(tap) = &mut self.tap {
-            tap.begin(self.channels, self.expected, rate_hz);
+            tap.begin(self.layout.channels(), self.layout.words(), self.expected, rate_hz);
         }
     }
 
@@ -143,7 +202,7 @@ impl Stream {
         let first = block.header.first_scan;
         if block.header.epoch != self.epoch
             || block.header.map != self.map
-            || block.channels() != self.channels
+            || block.words_per_scan() != self.words()
             || first < self.first_scan
         {
             return false;
@@ -181,7 +240,7 @@ impl Stream {
     /// Notes that the device produced scans up to `next_scan` and nothing more is under way: whole
     /// blocks that have not arrived (when `ended`, partial ones too) are missing.
     pub fn note_tail(&mut self, next_scan: u64, ended: bool) {
-        let block = jointrig_protocol::limits::scans_per_block(self.channels).unwrap_or(1) as u64;
+        let block = jointrig_protocol::limits::scans_per_block(self.words()).unwrap_or(1) as u64;
         let behind = next_scan.saturating_sub(self.expected);
         self.tail = self.expected + if ended { behind } else { behind / block * block };
         if ended {
@@ -196,14 +255,18 @@ impl Stream {
         (end > self.expected).then_some(self.expected..end)
     }
 
+    fn words(&self) -> usize {
+        self.layout.words()
+    }
+
     fn append(&mut self, first: u64, codes: impl Iterator<Item = i16>, again: bool) {
-        let skip = (self.expected - first) as usize * self.channels;
+        let skip = (self.expected - first) as usize * self.words();
         let before = self.tape.len();
         self.tape.extend(codes.skip(skip));
         if let Some(tap) = &mut self.tap {
             tap.fold(&self.tape[before..]);
         }
-        let scans = ((self.tape.len() - before) / self.channels) as u64;
+        let scans = ((self.tape.len() - before) / self.words()) as u64;
         self.expected += scans;
         if again {
             self.accounts.recovered += scans;
@@ -223,11 +286,11 @@ impl Stream {
             {
                 let first = *entry.key();
                 let held = entry.remove();
-                self.held_scans -= (held.codes.len() / self.channels) as u64;
-                if first + (held.codes.len() / self.channels) as u64 > self.expected {
+                self.held_scans -= (held.codes.len() / self.words()) as u64;
+                if first + (held.codes.len() / self.words()) as u64 > self.expected {
                     self.append(first, held.codes.into_iter(), held.again);
                 } else {
-                    self.accounts.duplicates += (held.codes.len() / self.channels) as u64;
+                    self.accounts.duplicates += (held.codes.len() / self.words()) as u64;
                 }
             } else if self.gone.first().is_some_and(|range| range.start <= self.expected) {
                 let held = self.held.first_key_value().map_or(u64::MAX, |(first, _)| *first);
@@ -253,12 +316,12 @@ impl Stream {
         self.newest = self.newest.max(end);
         // bounds the memory that a faulty device can claim: after a long gap the tape starts again
         // behind it, also if the caller never releases samples
-        if scans > self.bound || self.tape.len() as u64 + scans * self.channels as u64 > TAPE_KEPT {
+        if scans > self.bound || self.tape.len() as u64 + scans * self.words() as u64 > TAPE_KEPT {
             // too many zeros to keep: the tape starts again after the gap
             self.tape.clear();
             self.tape_first = end;
         } else {
-            self.tape.resize(self.tape.len() + scans as usize * self.channels, 0);
+            self.tape.resize(self.tape.len() + scans as usize * self.words(), 0);
         }
     }
 
@@ -267,7 +330,7 @@ impl Stream {
         let scan = scan.clamp(self.tape_first, self.expected);
         // moving the tape costs time proportional to its length, so wait until half of it is
         // released
-        let stale = (scan - self.tape_first) as usize * self.channels;
+        let stale = (scan - self.tape_first) as usize * self.words();
         if stale > self.tape.len() / 2 {
             self.tape.drain(..stale);
             self.tape_first = scan;
@@ -278,7 +341,6 @@ impl Stream {
     /// samples are 0.
     pub fn cut(&self, range: Range<u64>) -> (Samples, Vec<Range<usize>>) {
         let scans = (range.end - range.start) as usize;
-        let mut codes = vec![0; scans * self.channels];
         let there = range.start.max(self.tape_first)..range.end.min(self.expected);
         let mut gaps = Vec::new();
         let mut gap = |missing: Range<u64>| {
@@ -289,21 +351,17 @@ impl Stream {
         };
         if there.start >= there.end {
             gap(range.clone());
-            return (Samples::of_codes(&codes, self.channels), gaps);
+            return (self.layout.samples(scans, 0, &[]), gaps);
         }
         gap(range.start..there.start);
         for lost in &self.lost {
             gap(lost.start.max(there.start)..lost.end.min(there.end));
         }
         gap(there.end..range.end);
-        let from = (there.start - self.tape_first) as usize * self.channels;
-        let to = (there.end - self.tape_first) as usize * self.channels;
+        let from = (there.start - self.tape_first) as usize * self.words();
+        let to = (there.end - self.tape_first) as usize * self.words();
         let at = (there.start - range.start) as usize;
-        for channel in 0..self.channels {
-            let own = self.tape[from..to].iter().skip(channel).step_by(self.channels);
-            codes[channel * scans + at..].iter_mut().zip(own).for_each(|(code, own)| *code = *own);
-        }
-        (Samples::of_codes(&codes, self.channels), gaps)
+        (self.layout.samples(scans, at, &self.tape[from..to]), gaps)
     }
 }
 

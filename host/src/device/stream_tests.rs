@@ -116,3 +116,44 @@ fn forgetting_keeps_what_is_still_wanted() {
     assert!(stream.tape.len() < 800);
     assert_eq!(stream.cut(300..400).0, samples(300..400));
 }
+
+#[test]
+fn wide_channels_are_joined_from_their_two_words() {
+    let channel = |name: &str, bits| jointrig_protocol::channel::Channel {
+        name: name.parse().expect("short"),
+        role: jointrig_protocol::channel::Role::Auxiliary,
+        quantity: jointrig_protocol::channel::Quantity::Voltage,
+        units_per_volt: 1.0,
+        range_v: 10.0,
+        delay_ns: 0,
+        bits,
+    };
+    // 24 bits, 16 bits, 30 bits: five words per scan
+    let bits = [24, 16, 30];
+    let channels = bits.iter().enumerate().map(|(place, bits)| channel(&format!("c{place}"), *bits));
+    let map = ChannelMap { id: 0, rate_hz: 51_200, exact_hz: None, channels: channels.collect() };
+    let code = |scan: i32, place: usize| [-8_388_608, -32_768, 536_870_911][place] / (1 + scan);
+    let scan = |scan: i32| {
+        let [one, two, three] = [0, 1, 2].map(|place| code(scan, place));
+        let [a, d] = jointrig_protocol::channel::split_code(one, 24);
+        let [c, e] = jointrig_protocol::channel::split_code(three, 30);
+        [a, two as i16, c, d, e].map(i16::to_le_bytes)
+    };
+    let header = Header { flags: 0, map: 0, scans: 4, epoch: 7, first_scan: 0 };
+    let mut bytes = header.to_bytes().to_vec();
+    bytes.extend((0..4).flat_map(scan).flatten());
+    let mut stream = Stream::new(7, 0, 0, &map, 1000);
+    assert!(stream.take(&Block::from_payload(&bytes).expect("whole scans")));
+    stream.mark_lost(4..6);
+    let (samples, gaps) = stream.cut(1..6);
+    assert_eq!(gaps, [3..5]);
+    let all = |place: usize| (1..4).map(move |scan| code(scan, place)).chain([0, 0]);
+    let wanted = Samples::new(vec![
+        ChannelSamples::I32(all(0).collect()),
+        ChannelSamples::I16(all(1).map(|code| code as i16).collect()),
+        ChannelSamples::I32(all(2).collect()),
+    ]);
+    assert_eq!(Some(samples), wanted);
+    // a map of other widths has scans of another length
+    assert!(!Stream::new(7, 0, 0, 3, 1000).take(&Block::from_payload(&bytes).expect("whole scans")));
+}

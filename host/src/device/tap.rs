@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError, TryLockError};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
 
-use jointrig_protocol::limits::MAX_CHANNELS;
+use jointrig_protocol::limits::CHANNEL_CAPACITY;
 
 /// Most stretches of one envelope: two frames of a screen at the finest resolution. Even, so that
 /// pairs can be joined.
@@ -38,8 +38,8 @@ pub struct Envelope {
     ends: Box<[[i16; 2]]>,
     /// Scans that arrived; the others of the envelope are lost.
     pub arrived: u64,
-    sums: [i64; MAX_CHANNELS],
-    squares: [u64; MAX_CHANNELS],
+    sums: [i64; CHANNEL_CAPACITY],
+    squares: [u64; CHANNEL_CAPACITY],
 }
 
 impl Envelope {
@@ -49,17 +49,17 @@ impl Envelope {
             first_scan: 0,
             scans_per_stretch: 1,
             stretches: 0,
-            ends: vec![NOTHING; MOST_STRETCHES * MAX_CHANNELS].into(),
+            ends: vec![NOTHING; MOST_STRETCHES * CHANNEL_CAPACITY].into(),
             arrived: 0,
-            sums: [0; MAX_CHANNELS],
-            squares: [0; MAX_CHANNELS],
+            sums: [0; CHANNEL_CAPACITY],
+            squares: [0; CHANNEL_CAPACITY],
         }
     }
 
     fn begin(&mut self, channels: usize, first_scan: u64, scans_per_stretch: u32) {
         (self.channels, self.first_scan, self.scans_per_stretch) = (channels, first_scan, scans_per_stretch);
         (self.stretches, self.arrived) = (0, 0);
-        (self.sums, self.squares) = ([0; MAX_CHANNELS], [0; MAX_CHANNELS]);
+        (self.sums, self.squares) = ([0; CHANNEL_CAPACITY], [0; CHANNEL_CAPACITY]);
     }
 
     /// Smallest and largest code, channel by channel within each stretch; [`NOTHING`] where every
@@ -105,8 +105,10 @@ pub struct Tap {
     shared: Arc<Shared>,
     making: Box<Envelope>,
     finest: u32,
+    /// 16-bit words per scan; the first ones are the channels' codes.
+    words: usize,
     /// Codes of the current stretch, and how many of its scans are done.
-    open: [[i16; 2]; MAX_CHANNELS],
+    open: [[i16; 2]; CHANNEL_CAPACITY],
     over: u32,
 }
 
@@ -124,35 +126,44 @@ pub fn tap() -> (Tap, View) {
         slot: Mutex::new(Slot { envelope: empty(), fresh: false }),
         looks: OnceLock::new(),
     });
-    let tap =
-        Tap { shared: shared.clone(), making: empty(), finest: 1, open: [NOTHING; MAX_CHANNELS], over: 0 };
+    let tap = Tap {
+        shared: shared.clone(),
+        making: empty(),
+        finest: 1,
+        words: 0,
+        open: [NOTHING; CHANNEL_CAPACITY],
+        over: 0,
+    };
     (tap, View { shared, own: empty() })
 }
 
 impl Tap {
-    /// Begins a new stream at `first_scan`; an incomplete envelope is discarded.
-    pub fn begin(&mut self, channels: usize, first_scan: u64, rate_hz: f64) {
-        let channels = channels.min(MAX_CHANNELS);
+    /// Begins a new stream at `first_scan`, whose scans have `words` 16-bit words, first one of each
+    /// channel; an incomplete envelope is discarded.
+    pub fn begin(&mut self, channels: usize, words: usize, first_scan: u64, rate_hz: f64) {
+        let channels = channels.min(CHANNEL_CAPACITY);
+        self.words = words.max(1);
         self.finest = ((FINEST_S * rate_hz).round() as u32).max(1);
         self.restart(channels, first_scan);
     }
 
     fn restart(&mut self, channels: usize, first_scan: u64) {
         self.making.begin(channels, first_scan, self.finest);
-        (self.open, self.over) = ([NOTHING; MAX_CHANNELS], 0);
+        (self.open, self.over) = ([NOTHING; CHANNEL_CAPACITY], 0);
     }
 
-    /// Adds the next scans; `codes` holds one scan after another.
+    /// Adds the next scans; `codes` holds the words of one scan after another. Of a wide channel the
+    /// upper 16 bits are shown.
     pub fn fold(&mut self, mut codes: &[i16]) {
         let channels = self.making.channels;
         if channels == 0 {
             return;
         }
-        while codes.len() >= channels {
-            let scans = (codes.len() / channels).min((self.making.scans_per_stretch - self.over) as usize);
-            let (now, rest) = codes.split_at(scans * channels);
-            for scan in now.chunks_exact(channels) {
-                for (channel, code) in scan.iter().enumerate() {
+        while codes.len() >= self.words {
+            let scans = (codes.len() / self.words).min((self.making.scans_per_stretch - self.over) as usize);
+            let (now, rest) = codes.split_at(scans * self.words);
+            for scan in now.chunks_exact(self.words) {
+                for (channel, code) in scan[..channels].iter().enumerate() {
                     let [least, most] = &mut self.open[channel];
                     (*least, *most) = ((*least).min(*code), (*most).max(*code));
                     let wide = i64::from(*code);
@@ -200,7 +211,7 @@ impl Tap {
         let at = making.stretches * making.channels;
         making.ends[at..at + making.channels].copy_from_slice(&self.open[..making.channels]);
         making.stretches += 1;
-        (self.open, self.over) = ([NOTHING; MAX_CHANNELS], 0);
+        (self.open, self.over) = ([NOTHING; CHANNEL_CAPACITY], 0);
         if self.shared.wanted.load(Ordering::Acquire) {
             self.hand_over();
         }

@@ -10,7 +10,7 @@ fn scans(range: std::ops::Range<i32>) -> Vec<i16> {
 fn begun() -> (Tap, View) {
     let (mut tap, view) = tap();
     // 4 scans per millisecond
-    tap.begin(2, 100, 4_000.0);
+    tap.begin(2, 2, 100, 4_000.0);
     (tap, view)
 }
 
@@ -85,7 +85,7 @@ fn lost_scans_leave_a_hole_and_time_goes_on() {
 #[test]
 fn nothing_is_seen_twice_and_nothing_is_left_out() {
     let (mut tap, mut view) = tap();
-    tap.begin(1, 0, 4_000.0);
+    tap.begin(1, 1, 0, 4_000.0);
     let folds = std::thread::spawn(move || {
         for _ in 0..20_000 {
             tap.fold(&[1; 7]);

@@ -38,6 +38,27 @@ pub trait Transport: Send {
     fn simulated(&self) -> Option<Simulated> {
         None
     }
+
+    /// What is known about a recorder whose samples come over a bridge, beyond the protocol; `None`
+    /// for any other device.
+    fn recorder(&self) -> Option<Recorder> {
+        None
+    }
+
+    /// Sentences about a recorder since the last call, each of which a person should read.
+    fn take_remarks(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// A recorder whose samples come over a bridge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recorder {
+    /// Scans per second, Hz; the protocol knows the nearest integer.
+    pub rate_hz: f64,
+    /// Scans of its longest block so far: a scan may have been sampled by so much before it
+    /// arrives.
+    pub longest_block: u32,
 }
 
 /// A device that is simulated in this process.

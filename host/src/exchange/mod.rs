@@ -20,6 +20,7 @@ pub mod frf_uff;
 pub mod labelled_frf;
 mod npy_header;
 pub mod npz;
+pub mod npz_long;
 mod other_formats;
 #[cfg(feature = "parquet")]
 pub mod parquet;

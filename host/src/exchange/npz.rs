@@ -302,6 +302,43 @@ impl NpzFile {
         }
     }
 
+    /// An array's header, and where its values lie: for arrays that are read in pieces. The whole
+    /// array is read once, because the archive checks its checksum only then.
+    pub(super) fn places(&mut self, array: &str, expected: &str) -> Result<(Header, Bytes), NpzError> {
+        let (header, count) = self.header(array, expected)?;
+        let at = self.archive.index_for_name(&file_name_from_array_name(array));
+        let stored = at.and_then(|at| {
+            let member = self.archive.by_index(at).ok()?;
+            let plain = member.compression() == CompressionMethod::Stored;
+            member.data_start().filter(|_| plain)
+        });
+        if stored.is_none() {
+            self.charge(array, count, header.width as u64, expected)?;
+        }
+        let mut from = self.member(array, expected)?;
+        let mut read = || -> Result<(u64, Vec<u8>), String> {
+            let damaged = |error: io::Error| format!("is damaged ({error})");
+            let mut counted = Counted { from: &mut from, bytes: 0 };
+            Header::read(&mut counted)?;
+            let begin = counted.bytes;
+            let mut values = Vec::new();
+            if stored.is_some() {
+                io::copy(&mut from, &mut io::sink()).map_err(damaged)?;
+            } else {
+                let length = count * header.width;
+                values = vec![0; length];
+                from.read_exact(&mut values).map_err(damaged)?;
+                from.read(&mut [0]).map_err(damaged)?;
+            }
+            Ok((begin, values))
+        };
+        let read = read();
+        drop(from);
+        let (begin, values) = read.map_err(|found| self.unexpected(array, &found, expected))?;
+        let bytes = stored.map_or(Bytes::Memory(values), |start| Bytes::File(start + begin));
+        Ok((header, bytes))
+    }
+
     /// Passes the bytes of every element to `take`, in file order.
     fn elements(
         &mut self,
@@ -333,6 +370,28 @@ impl NpzFile {
         let read = read();
         drop(from);
         read.map_err(|found| self.unexpected(array, &found, expected))
+    }
+}
+
+/// Where the values of an array are.
+pub(super) enum Bytes {
+    /// In the file, from this offset.
+    File(u64),
+    /// In memory, because the file has them compressed.
+    Memory(Vec<u8>),
+}
+
+/// Counts the bytes that are read.
+struct Counted<R> {
+    from: R,
+    bytes: u64,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let read = self.from.read(into)?;
+        self.bytes += read as u64;
+        Ok(read)
     }
 }
 

@@ -16,11 +16,12 @@ use crate::campaign::plan::level::Level;
 use crate::campaign::run::shaking::record;
 use crate::campaign::watch::{Seen, Watch};
 use crate::device::channels::ChannelMap;
-use crate::device::samples::{ChannelView, Samples};
+use crate::device::samples::{ChannelSamples, ChannelView, SampleType, Samples};
 use crate::device::stream::Accounts;
 use crate::device::tap::{Envelope, NOTHING, View};
 use crate::hysteresis::RelativeMotion;
 use crate::hysteresis::cycles::closed_cycle;
+use jointrig_protocol::channel::Channel;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -62,7 +63,7 @@ struct Known {
     shaker: Option<Shaker>,
     levels: u64,
     signals: LevelSums,
-    cycles: Vec<i16>,
+    cycles: Vec<i32>,
 }
 
 impl Watching {
@@ -229,7 +230,8 @@ impl Known {
             let scans = self.cycles.len() / channels.len();
             let codes = self.cycles[place * scans..][..scans].iter();
             let most = codes.map(|code| code.unsigned_abs()).max().unwrap_or(0);
-            let si = f64::from(most) * channels.channels[place].units_per_code().abs();
+            let channel = &channels.channels[place];
+            let si = f64::from(most) * code_type(channel).units(channel).abs();
             limit.largest = limit.largest.max(si);
         }
     }
@@ -322,6 +324,11 @@ fn free_bytes(file: &std::path::Path) -> Option<u64> {
     }
 }
 
+/// The type of a device's samples of this channel.
+fn code_type(channel: &Channel) -> SampleType {
+    if channel.is_wide() { SampleType::I32 } else { SampleType::I16 }
+}
+
 /// Most points of a loop on the screen.
 const POINTS: usize = 180;
 
@@ -330,7 +337,7 @@ const POINTS: usize = 180;
 pub fn turn(
     channels: &ChannelMap,
     load_cells: &[(usize, f64)],
-    codes: &[i16],
+    codes: &[i32],
     level: &Level,
 ) -> Option<[Vec<f64>; 2]> {
     let count = channels.len();
@@ -342,8 +349,14 @@ pub fn turn(
         return None;
     }
     let from = scans - cycle - 2 * spare;
-    let last: Vec<i16> = codes.chunks_exact(scans).flat_map(|channel| &channel[from..]).copied().collect();
-    let samples = Samples::of_codes(&last, count);
+    let last = codes.chunks_exact(scans).zip(&channels.channels).map(|(own, channel)| {
+        let own = &own[from..];
+        match code_type(channel) {
+            SampleType::I32 => ChannelSamples::I32(own.to_vec()),
+            _ => ChannelSamples::I16(own.iter().map(|code| *code as i16).collect()),
+        }
+    });
+    let samples = Samples::new(last.collect())?;
     let record = record(channels, load_cells, &samples, level).ok()?;
     let RelativeMotion::Velocity { a_m_per_s, b_m_per_s } = &record.motion else { return None };
     let length = a_m_per_s.len().min(b_m_per_s.len()).min(record.force_n.len());
@@ -426,8 +439,8 @@ pub enum WatchReport {
 /// The newest cycles of a level.
 #[derive(Debug, Default)]
 pub struct Cycles {
-    /// Codes, one channel after another.
-    pub codes: Vec<i16>,
+    /// Codes of 16 bits or wide ones, one channel after another.
+    pub codes: Vec<i32>,
     /// Whether they have not been read yet.
     pub fresh: bool,
 }
@@ -453,14 +466,14 @@ pub fn watcher() -> (Watcher, WatchQueue) {
 }
 
 /// A buffer for the cycles, allocated in advance so that the measuring thread never allocates.
-pub fn room() -> Vec<i16> {
+pub fn room() -> Vec<i32> {
     Vec::with_capacity(MOST_CODES)
 }
 
 impl WatchQueue {
     /// Swaps the newest cycles with `own` if they have not been read yet; `own` should come from
     /// [`room`].
-    pub fn cycles(&self, own: &mut Vec<i16>) -> bool {
+    pub fn cycles(&self, own: &mut Vec<i32>) -> bool {
         let mut cycles = self.cycles.lock().unwrap_or_else(PoisonError::into_inner);
         let fresh = std::mem::take(&mut cycles.fresh);
         if fresh {
@@ -486,8 +499,13 @@ impl Watcher {
         // the buffer never grows: of a longer window the last scans are kept
         let kept = samples.scans().min(MOST_CODES / samples.channels().max(1));
         for place in 0..samples.channels() {
-            if let ChannelView::I16(codes) = samples.channel(place) {
-                cycles.codes.extend_from_slice(&codes[codes.len() - kept..]);
+            match samples.channel(place) {
+                ChannelView::I16(own) => {
+                    cycles.codes.extend(own[own.len() - kept..].iter().copied().map(i32::from));
+                }
+                ChannelView::I32(own) => cycles.codes.extend_from_slice(&own[own.len() - kept..]),
+                // a device delivers codes only
+                ChannelView::F32(_) | ChannelView::F64(_) => {}
             }
         }
         cycles.fresh = true;
@@ -567,8 +585,8 @@ mod tests {
         let level = Level { frequency_hz: 100.0, end_hz: None, held: Held::Displacement, amplitude: 2e-6 };
         let omega = TAU * 100.0;
         let code =
-            |place: usize, value: f64| (value / channels.channels[place].units_per_code()).round() as i16;
-        let codes = |scans: i32| -> Vec<i16> {
+            |place: usize, value: f64| (value / channels.channels[place].units_per_code()).round() as i32;
+        let codes = |scans: i32| -> Vec<i32> {
             let of = |place: usize| {
                 (0..scans).map(move |scan| {
                     let (sin, cos) = (omega * f64::from(scan) / 51_200.0).sin_cos();

@@ -254,6 +254,8 @@ pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
 pub const HAMMER_SLIP: &str = "hammer-slip";
 /// Name of the check on wear.
 pub const UNCHANGED: &str = "contact-unchanged";
+/// Name of the check on the masses of fixed sensors.
+pub const SENSOR_MASSES: &str = "sensor-masses";
 /// Name of the check on the rigid motions added by coupling.
 pub const INTERFACE_MODES: &str = "interface-modes";
 /// Name of the check that compares n_i with n_c.

@@ -3,7 +3,9 @@
 mod accuracy;
 mod averaged;
 mod between_arms;
+mod bridge;
 mod cmif;
+mod cut;
 mod decoupling_reference;
 mod explained;
 mod fit;

@@ -69,7 +69,7 @@ proptest! {
         let _ = postcard::from_bytes::<answer::Numbered>(&bytes);
         let _ = postcard::from_bytes::<event::Numbered>(&bytes);
         if let Some(block) = block::Block::from_payload(&bytes) {
-            prop_assert_eq!(block.codes().len(), block.channels() * usize::from(block.header.scans));
+            prop_assert_eq!(block.codes().len(), block.words_per_scan() * usize::from(block.header.scans));
         }
     }
 }

@@ -8,7 +8,7 @@ use jointrig::results::Results;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table};
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
-use jointrig_tests::rigs::{Drawn, contact_plan, near_instead_plan, near_plan};
+use jointrig_tests::rigs::{Drawn, by_hand_plan, contact_plan, near_instead_plan, near_plan};
 use jointrig_tests::slip_truth::slid;
 use std::path::Path;
 
@@ -147,7 +147,13 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
 }
 
 /// Hits of about 50 N with a slip limit of 15 N.
-const MAY_SLIP: Drawn = Drawn { slip_limit_n: Some(15.0), stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005 };
+const MAY_SLIP: Drawn = Drawn {
+    slip_limit_n: Some(15.0),
+    stiffest_n_per_m: 300e6,
+    errors: 1.0,
+    gain: 0.005,
+    accelerometers: false,
+};
 
 /// From rig number `first` on, the first `each` rigs that slip under the hammer, and the first
 /// `each` that stick.
@@ -223,6 +229,47 @@ fn marks_beside_the_contact() {
         rows.extend(lines(name, &campaigns(first, rigs, seeds, like, |campaign| told_of(campaign, *plan))));
     }
     print_table("marks", &columns("points"), &rows);
+}
+
+/// The first `rigs` numbers from `first` on whose rigs have no clamp on side B.
+fn without_clamp_b(first: u64, rigs: u64) -> Vec<u64> {
+    (first..).filter(|number| !number.is_multiple_of(3)).take(rigs as usize).collect()
+}
+
+/// Median of the intervals' half widths relative to the estimates.
+fn median_half_width(rows: &[Row]) -> f64 {
+    let half = |row: &Row| row.stiffness.found.map(|[mean, low, high]| 0.5 * (high - low) / mean);
+    let mut all: Vec<f64> = rows.iter().filter_map(half).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+#[test]
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: accelerometers"]
+fn accelerometers_in_place_of_lasers() {
+    let numbers = without_clamp_b(count("FIRST", 700), count("RIGS", 20));
+    let lasers = Drawn::default();
+    let like = Drawn { accelerometers: true, ..lasers };
+    let kinds: [(&str, Drawn, Plan); 2] = [
+        ("accelerometers, hits by hand: `contact-by-hand.toml`", like, by_hand_plan),
+        ("lasers on the same rigs: `contact.toml`", lasers, contact_plan),
+    ];
+    let mut found = Vec::new();
+    let kinds = kinds.iter().enumerate().filter(|(n, _)| count("PLAN", *n as u64) == *n as u64);
+    for (_, (name, like, plan)) in kinds {
+        println!("{name}");
+        let like = *like;
+        let wanted: Vec<DrawnCampaign> =
+            numbers.iter().map(|number| DrawnCampaign { number: *number, seed: 0, like }).collect();
+        found.push((name, each_of(&wanted, |campaign| told_of(campaign, *plan))));
+    }
+    let rows: Vec<String> = found.iter().flat_map(|(name, rows)| lines(name, rows)).collect();
+    print_table("accelerometers", &columns("sensors"), &rows);
+    let widths: Vec<f64> = found.iter().map(|(_, rows)| median_half_width(rows)).collect();
+    println!("median half widths: {widths:?}");
+    let missed = found[0].1.iter().filter(|row| !row.stiffness.covers()).count();
+    // of 20 intervals of 95 % three or fewer miss with a probability of 98 %
+    assert!(missed <= 3, "{:?}", found[0].1);
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! Integration tests of whole systems across the packages, one program so that it is linked once.
 
+mod accelerometers;
 mod another_structure;
 mod any_structure;
 mod between_arms_accuracy;
+mod bridge;
 mod calibration;
 mod compare;
 mod contact_accuracy;
@@ -35,4 +37,5 @@ mod simulated_truth;
 mod sync;
 mod troubleshooting;
 mod tutorial;
+mod wide_channels;
 mod wrong_files;

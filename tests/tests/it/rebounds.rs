@@ -43,6 +43,7 @@ fn map(channels: &[rig::Channel]) -> ChannelMap {
         quantity: match channel.quantity {
             Measured::Force => Quantity::Force,
             Measured::Velocity => Quantity::Velocity,
+            Measured::Acceleration => Quantity::Acceleration,
         },
         units_per_volt: (channel.units_per_volt * f64::from(channel.polarity)) as f32,
         range_v: channel.range_v as f32,

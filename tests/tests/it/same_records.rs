@@ -3,8 +3,8 @@
 
 use jointrig::device::address::Address;
 use jointrig::device::transport::Transport;
-use jointrig_tests::campaign::{Kept, plan, run};
-use jointrig_tests::command::Served;
+use jointrig_tests::campaign::{Kept, by_hand, plan, run};
+use jointrig_tests::command::{Served, binary};
 
 #[path = "../../../host/tests/it/scripted_device/faulty.rs"]
 mod faulty;
@@ -59,4 +59,30 @@ fn a_pseudo_terminal_carries_the_same_records() {
 fn a_socket_carries_the_same_records() {
     let served = Served::start(&["--tcp", "127.0.0.1:0", "--seed", "7"]);
     assert_eq!(over(open(&served.address, 0)), over(open("sim:", 7)));
+}
+
+/// The by-hand rig's codes as a recorder's blocks, and its volts: an operator strikes twice in each
+/// cell.
+#[test]
+#[cfg(unix)]
+fn a_bridge_carries_the_same_records() {
+    let cells = by_hand(2, &[("A", &["AZ3"], &["A3"]), ("AJB", &["AZ3"], &["A3", "B3"])]);
+    // the operator strikes every 4 s, whether or not the structure is at rest
+    let cells = cells.replace("quiet_relative = 0.003", "quiet_relative = 0.9");
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../hil-sim/rigs/by-hand.toml");
+    let over = |address: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let (summary, records) = run(&folder.path().join("c.jrig"), &cells, open(address, 7));
+        assert_eq!((summary.kept, summary.hits), (6, 6));
+        assert_eq!((summary.accounts.unexplained(), summary.accounts.lost), (0, 0), "{:?}", summary.accounts);
+        records
+    };
+    let direct = over(&format!("sim:{rig}"));
+    for how in ["--block 1000", "--block 5120 --volts"] {
+        let play = binary("JOINTRIG_HIL_SIM_BIN").display().to_string();
+        let bridge = format!(
+            "bridge:{play} play --rig {rig} --seed 7 --hits 2 --visit A/AZ3/A3 --visit AJB/AZ3/A3 --visit AJB/AZ3/B3 {how}"
+        );
+        assert_eq!(over(&bridge), direct, "{how}");
+    }
 }

@@ -32,10 +32,11 @@ const OF_A_BOARD: [&str; 6] = [
 ];
 
 /// Every package of both workspaces has an entry; dependencies only point to earlier entries.
-const RULES: [Rule; 17] = [
+const RULES: [Rule; 19] = [
     rule("jointrig-hot", &[]),
     rule("jointrig-protocol", &["jointrig-hot"]),
     rule("jointrig-firmware", &["jointrig-protocol", "jointrig-hot"]),
+    rule("jointrig-native", &["jointrig-protocol", "jointrig-firmware"]),
     rule("jointrig-copy", &[]),
     rule("jointrig-board-fault", &["jointrig-firmware"]),
     rule("jointrig-board-log", &["jointrig-firmware"]),
@@ -44,13 +45,17 @@ const RULES: [Rule; 17] = [
     rule("jointrig-logs", &[]),
     rule("jointrig-analysis", &[]),
     rule("jointrig-uff", &[]),
-    rule("jointrig-hil-sim", &["jointrig-hot", "jointrig-protocol", "jointrig-firmware", "jointrig-logs"]),
+    rule(
+        "jointrig-hil-sim",
+        &["jointrig-hot", "jointrig-protocol", "jointrig-firmware", "jointrig-native", "jointrig-logs"],
+    ),
+    rule("jointrig-bridge", &["jointrig-protocol", "jointrig-firmware", "jointrig-native"]),
     Rule {
         package: "jointrig",
         uses: &["jointrig-protocol", "jointrig-logs", "jointrig-analysis", "jointrig-uff"],
-        behind_a_feature: &["jointrig-hil-sim"],
+        behind_a_feature: &["jointrig-hil-sim", "jointrig-bridge", "jointrig-native"],
     },
-    rule("jointrig-python", &["jointrig"]),
+    rule("jointrig-python", &["jointrig", "jointrig-protocol"]),
     rule(
         "jointrig-tests",
         &[
@@ -60,6 +65,7 @@ const RULES: [Rule; 17] = [
             "jointrig-analysis",
             "jointrig-uff",
             "jointrig-hil-sim",
+            "jointrig-bridge",
             "jointrig",
         ],
     ),

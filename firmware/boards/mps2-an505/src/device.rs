@@ -42,6 +42,7 @@ pub fn run(setup: &Setup) -> ! {
     static CORE: StaticCell<Shared> = StaticCell::new();
 
     let channels: &'static [Channel] = CHANNELS.init(setup.channels.clone());
+    // the emulated converters have 16 bits: every channel is one word of a scan
     let per_block = scans_per_block(channels.len()).expect("a set-up names 1 to 16 channels");
     let facts = Facts {
         board: Name::try_from(Info::EMULATED_BOARD).unwrap_or_default(),

@@ -36,6 +36,9 @@ pub enum QemuError {
     /// The rig's description is invalid.
     #[error(transparent)]
     Rig(#[from] RigError),
+    /// The rig's converters are wider than the emulated ones.
+    #[error("the emulated board has converters of 16 bits and the rig asks for {0}: use `sim:` for this rig")]
+    Bits(u8),
     /// There is no image.
     #[error("there is no firmware image {0}: `cargo xtask firmware --board mps2-an505` builds it")]
     NoImage(PathBuf),
@@ -91,6 +94,9 @@ impl QemuBoard {
         options: &Options,
     ) -> Result<(Self, HostEnd), QemuError> {
         let rig = Rig::new(config, options.seed)?;
+        if config.sensors.bits != 16 {
+            return Err(QemuError::Bits(config.sensors.bits));
+        }
         if !image.is_file() {
             return Err(QemuError::NoImage(image.to_path_buf()));
         }

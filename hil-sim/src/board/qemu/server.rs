@@ -89,6 +89,7 @@ impl Server {
         pipes: Pipes,
         ram: SharedRam,
     ) -> Self {
+        // checked by the caller: the emulated converters have 16 bits, so a channel is one word
         let channels = describe(rig.channels());
         let per_block = scans_per_block(channels.len()).expect("the rig has ten channels");
         let setup = Setup {

@@ -4,7 +4,8 @@
 
 use super::{BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side};
 use crate::rig::RigError;
-use crate::rig::channels::{CHANNELS, channels};
+use crate::rig::channels::{CHANNELS, FORCE, channels};
+use jointrig_protocol::channel::{NARROW_BITS, WIDE_BITS};
 use jointrig_protocol::limits::MAX_CHANNELS;
 use serde::Deserialize;
 use toml::Spanned;
@@ -74,6 +75,7 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
         ("errors.gain", errors.gain),
         ("errors.hammer_gain", errors.hammer_gain),
         ("errors.skew_s", errors.skew_s),
+        ("errors.transverse", errors.transverse),
         ("errors.load_cell_cross_talk", errors.load_cell_cross_talk),
     ] {
         not_negative(field, value)?;
@@ -228,6 +230,10 @@ fn sensors(config: &RigConfig) -> Result<(), RigError> {
     let sensors = &config.sensors;
     let rate_hz = f64::from(config.scan_rate_hz);
     positive("sensors.range_v", sensors.range_v)?;
+    if sensors.bits != 16 && !(NARROW_BITS + 1..=WIDE_BITS).contains(&sensors.bits) {
+        let least = NARROW_BITS + 1;
+        return Err(bad("sensors.bits", &format!("must be 16, or {least} to {WIDE_BITS}")));
+    }
     let scales = [
         ("sensors.force", sensors.force.units_per_volt),
         ("sensors.vibrometer", sensors.vibrometer.units_per_volt),
@@ -294,11 +300,23 @@ const NAME_BYTES: usize = jointrig_protocol::limits::NAME_BYTES;
 
 pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
     let fixed = &config.sensors.fixed;
-    if CHANNELS + fixed.len() > MAX_CHANNELS {
-        let most = MAX_CHANNELS - CHANNELS;
+    let mut taken: Vec<String> = channels(&config.sensors).map(|channel| channel.name).into();
+    let left_out = &config.sensors.left_out;
+    for (index, name) in left_out.iter().enumerate() {
+        if name == &taken[FORCE] {
+            return Err(bad("sensors.left_out", "the hammer's force is needed"));
+        }
+        if !taken.contains(name) || left_out[..index].contains(name) {
+            return Err(bad(
+                "sensors.left_out",
+                &format!("`{name}` is not one of the ten channels, or is listed twice"),
+            ));
+        }
+    }
+    let most = MAX_CHANNELS - (CHANNELS - left_out.len());
+    if fixed.len() > most {
         return Err(bad("sensors.fixed", &format!("are {}; a device has room for {most}", fixed.len())));
     }
-    let mut taken: Vec<String> = channels(&config.sensors).map(|channel| channel.name).into();
     for (index, own) in fixed.iter().enumerate() {
         let field = |name: &str| format!("sensors.fixed[{index}].{name}");
         let name = &own.name;
@@ -321,6 +339,7 @@ pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
         }
         positive(&field("units_per_volt"), own.units_per_volt)?;
         not_negative(&field("floor"), own.floor)?;
+        not_negative(&field("mass_kg"), own.mass_kg)?;
         not_negative(&field("delay_s"), own.delay_s)?;
         if own.delay_s * f64::from(config.scan_rate_hz) > 1e4 {
             return Err(bad(&field("delay_s"), "is more than 10000 scans: give the delay in seconds"));

@@ -441,6 +441,10 @@ pub struct Errors {
     pub hammer_gain: f64,
     /// Deviation from the declared delay (s), early or late, of every channel except the hammer's.
     pub skew_s: f64,
+    /// Sensitivity of each fixed sensor to motion along each of the two directions across its own,
+    /// relative.
+    #[serde(default)]
+    pub transverse: f64,
     /// Fraction of each neighbour's force that a load cell reads in addition to its own.
     pub load_cell_cross_talk: f64,
     /// a of N (1 + a x / x₀), the normal load of a slipping contact at its relative displacement x.
@@ -470,6 +474,7 @@ impl Errors {
             gain: 0.0,
             hammer_gain: 0.0,
             skew_s: 0.0,
+            transverse: 0.0,
             load_cell_cross_talk: 0.0,
             normal_load_variation: 0.0,
             normal_load_reference_m: self.normal_load_reference_m,
@@ -484,12 +489,24 @@ impl Errors {
     }
 }
 
+fn sixteen() -> u8 {
+    16
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_sixteen(bits: &u8) -> bool {
+    *bits == 16
+}
+
 /// All sensors. A channel reads volts × `units_per_volt`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensors {
     /// Converter range, ± this (V).
     pub range_v: f64,
+    /// Bits of the converters: 16, or 19 to 30.
+    #[serde(default = "sixteen", skip_serializing_if = "is_sixteen")]
+    pub bits: u8,
     /// The hammer's force cell.
     pub force: ForceSensor,
     /// The 3-D vibrometer: x, y, z.
@@ -502,24 +519,41 @@ pub struct Sensors {
     pub load_cells: LoadCells,
     /// The shaker's force cell.
     pub excitation: Excitation,
-    /// Vibrometers fixed to one point; none in the default rig.
+    /// Sensors fixed to one point; none in the default rig.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub fixed: Vec<FixedVibrometer>,
+    pub fixed: Vec<FixedSensor>,
+    /// Which of the rig's ten channels the front end does not have, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
 }
 
-/// A vibrometer fixed to a response point: one channel along one direction.
+/// What a fixed sensor measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FixedQuantity {
+    /// Velocity: a vibrometer.
+    #[default]
+    Velocity,
+    /// Acceleration: an accelerometer.
+    Acceleration,
+}
+
+/// A sensor fixed to a response point: one channel along one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FixedVibrometer {
+pub struct FixedSensor {
     /// Its channel's name.
     pub name: String,
     /// The response point at which it measures.
     pub response: String,
     /// Measured direction (any length; the sign counts).
     pub direction: [f64; 3],
-    /// m/s per V.
+    /// What it measures.
+    #[serde(default)]
+    pub quantity: FixedQuantity,
+    /// m/s or m/s² per V.
     pub units_per_volt: f64,
-    /// White noise floor ((m/s)/√Hz) up to half the scan rate.
+    /// White noise floor (m/s or m/s² per √Hz) up to half the scan rate.
     pub floor: f64,
     /// Delay of the signal (s).
     #[serde(default)]
@@ -527,6 +561,10 @@ pub struct FixedVibrometer {
     /// 1 or −1.
     #[serde(default = "upright")]
     pub polarity: i8,
+    /// Mass (kg) that it adds to the body at its point; a triaxial sensor states it for one of its
+    /// channels.
+    #[serde(default)]
+    pub mass_kg: f64,
 }
 
 fn upright() -> i8 {
@@ -609,6 +647,9 @@ pub struct LoadCells {
     pub delay_s: [f64; 3],
     /// 1 or −1.
     pub polarity: [i8; 3],
+    /// Whether the three are connected to a summing box: `lc_1` is then the sum of all.
+    #[serde(default)]
+    pub summed: bool,
 }
 
 /// The shaker's force cell.

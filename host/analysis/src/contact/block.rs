@@ -1,14 +1,21 @@
-//! The measured signals of a cell (the point on the specimen or arm along x, y and z, the spots
-//! next to the contact, the load cells), and the cells of one impact: rows, frequency lines and the
-//! parameters that they depend on.
+//! The measured signals of a cell (the point on the specimen or arm along its axes, the spots next
+//! to the contact if there are any, the load cells), and the cells of one impact: rows, frequency
+//! lines and the parameters that they depend on.
+//!
+//! A point is either visited by the 3-D vibrometer or has a fixed sensor, for example a triaxial
+//! accelerometer. The vibrometer's axes have one gain and delay each, whatever the point; a fixed
+//! sensor has its own, and its axes may be tilted. Fixed sensors measure every hit at the same time,
+//! so that several cells have the same hits: the signals that all cells contain (T and the spots)
+//! count in the first of them only.
 
 use super::parameters::{Cause, DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
-use super::{ContactError, Input};
+use super::{ContactError, ContactPriors, Input};
 use crate::band::Band;
 use crate::frf::MotionQuantity;
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
 use crate::substructuring::geometry::Grouping;
+use nalgebra::{Matrix6, SymmetricEigen, Vector3, Vector6};
 use num_complex::Complex;
 use std::collections::BTreeMap;
 
@@ -34,11 +41,27 @@ impl Group {
     }
 }
 
+/// One axis of the sensor at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis {
+    /// Unit vector of its nominal direction.
+    pub direction: [f64; 3],
+    /// Index of its gain among the parameters.
+    pub gain: usize,
+    /// Index of its delay among the parameters.
+    pub delay: usize,
+    /// Index of its two sensitivities to motion across the direction, and the unit vectors of that
+    /// motion; none if the direction is exact.
+    pub across: Option<(usize, [[f64; 3]; 2])>,
+}
+
 /// One cell of a block.
 #[derive(Debug, Clone)]
 pub struct BlockCell {
     /// The body that its point is on.
     pub group: Group,
+    /// The axes of its sensor: the channels from 3 on.
+    pub axes: Vec<Axis>,
     /// Index of the point's first coordinate among the parameters.
     pub point: usize,
     /// Index of the cell's own aim error (three parameters), if it has one.
@@ -55,7 +78,7 @@ pub struct BlockCell {
 pub struct ChannelRow {
     /// Index of the cell in the block.
     pub cell: usize,
-    /// T is 0, spot B 1, spot A 2, the point's x, y, z 3 to 5.
+    /// T is 0, spot B 1, spot A 2, the point's axes from 3 on.
     pub channel: usize,
 }
 
@@ -138,7 +161,7 @@ struct Impact<'a> {
 pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Block>, ContactError> {
     let impacts = impacts(input);
     let chosen = chosen_lines(input)?;
-    let mut points: BTreeMap<(Group, &str), usize> = BTreeMap::new();
+    let mut points: BTreeMap<(Group, &str), MeasuredPoint> = BTreeMap::new();
     for impact in &impacts {
         for (group, cell) in &impact.cells {
             points.entry((*group, cell.point)).or_insert_with(|| {
@@ -148,9 +171,11 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
                 };
                 let sigma = cell.point_sigma_m.unwrap_or(sigma);
                 let at = relative(cell.point_m, input.contact_m);
-                parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
+                let axes = axes(cell, &input.priors, parameters);
+                let position = parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
                     Parameter::new(format!("{axis} of point {}", cell.point), start, sigma, cause)
-                }))
+                }));
+                MeasuredPoint { position, axes }
             });
         }
     }
@@ -175,6 +200,70 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
         }
     }
     Ok(all)
+}
+
+/// A point, which several impacts may measure.
+#[derive(Debug, Clone)]
+struct MeasuredPoint {
+    /// Index of its first coordinate among the parameters.
+    position: usize,
+    /// The axes of its sensor.
+    axes: Vec<Axis>,
+}
+
+/// The axes of a cell's sensor, with the parameters of a fixed one.
+fn axes(cell: &ContactCell<'_>, priors: &ContactPriors, parameters: &mut Parameters) -> Vec<Axis> {
+    let own = |(place, direction): (usize, &[f64; 3])| {
+        let direction = *direction;
+        if !cell.fixed {
+            return Axis { direction, gain: GAINS + 2 + place, delay: DELAYS + 2 + place, across: None };
+        }
+        let name = |what: &str| format!("{what} of axis {} of the sensor at {}", place + 1, cell.point);
+        let gain = parameters.add([
+            Parameter::new(name("gain"), 0.0, priors.gain, Cause::Gains),
+            Parameter::new(name("delay"), 0.0, priors.skew_s, Cause::Skew),
+        ]);
+        let turned = (priors.transverse > 0.0).then(|| {
+            let across = ["first", "second"].map(|which| {
+                let what = format!("{which} transverse sensitivity");
+                Parameter::new(name(&what), 0.0, priors.transverse, Cause::SensorAxes)
+            });
+            (parameters.add(across), perpendicular(direction))
+        });
+        Axis { direction, gain, delay: gain + 1, across: turned }
+    };
+    cell.axes.directions().iter().enumerate().map(own).collect()
+}
+
+/// Two unit vectors at right angles to a unit vector and to each other.
+fn perpendicular(direction: [f64; 3]) -> [[f64; 3]; 2] {
+    let own = Vector3::from(direction);
+    let first = own.cross(&Vector3::ith(own.iamin(), 1.0)).normalize();
+    [first.into(), own.cross(&first).into()]
+}
+
+/// Smallest eigenvalue of a body's normalised 6 × 6 matrix of sensors relative to the largest: below
+/// this, the sensors leave one motion of the body undetermined.
+const DETERMINED: f64 = 2e-3;
+
+/// Whether sensors with these positions and unit directions determine all six motions of a rigid
+/// body. Two triaxial sensors do not: a rotation about the line through them moves neither.
+pub fn determines_motion(sensors: &[([f64; 3], [f64; 3])]) -> bool {
+    let count = sensors.len().max(1) as f64;
+    let at = |sensor: &([f64; 3], [f64; 3])| Vector3::from(sensor.0);
+    let centre = sensors.iter().map(at).sum::<Vector3<f64>>() / count;
+    let lever_m = (sensors.iter().map(|own| (at(own) - centre).norm_squared()).sum::<f64>() / count).sqrt();
+    if lever_m <= 0.0 {
+        return false;
+    }
+    let row = |sensor: &([f64; 3], [f64; 3])| {
+        let (d, r) = (Vector3::from(sensor.1), (at(sensor) - centre) / lever_m);
+        let turn = r.cross(&d);
+        Vector6::new(d.x, d.y, d.z, turn.x, turn.y, turn.z)
+    };
+    let gram: Matrix6<f64> = sensors.iter().map(row).map(|row| row * row.transpose()).sum();
+    let eigenvalues = SymmetricEigen::new(gram).eigenvalues;
+    eigenvalues.min() > DETERMINED * eigenvalues.max()
 }
 
 fn relative(at: [f64; 3], origin: [f64; 3]) -> [f64; 3] {
@@ -210,10 +299,16 @@ fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
     }
     let specimen_b = found.iter().any(|i| i.cells.iter().any(|(group, _)| *group == Group::SpecimenB));
     found.retain(|impact| {
-        let count = |of: Group| impact.cells.iter().filter(|(group, _)| *group == of).count();
-        count(Group::ArmB) >= 3
-            && (impact.structure == Structure::B || count(Group::SpecimenA) >= 3)
-            && (!specimen_b || count(Group::SpecimenB) >= 3)
+        let known = |of: Group| {
+            let own = impact.cells.iter().filter(|(group, _)| *group == of);
+            let sensors = own.flat_map(|(_, cell)| {
+                cell.axes.directions().iter().map(|direction| (cell.point_m, *direction))
+            });
+            determines_motion(&sensors.collect::<Vec<_>>())
+        };
+        known(Group::ArmB)
+            && (impact.structure == Structure::B || known(Group::SpecimenA))
+            && (!specimen_b || known(Group::SpecimenB))
     });
     found
 }
@@ -238,7 +333,7 @@ const LINE_DISTANCE: f64 = 0.4;
 fn block(
     impact: &Impact<'_>,
     impacts: &[Impact<'_>],
-    points: &BTreeMap<(Group, &str), usize>,
+    points: &BTreeMap<(Group, &str), MeasuredPoint>,
     input: &Input<'_>,
     chosen: &[usize],
     parameters: &mut Parameters,
@@ -254,23 +349,35 @@ fn block(
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<CellValues>::new());
-    for (group, cell) in &impact.cells {
-        let point = points[&(*group, cell.point)];
+    for (place, (group, cell)) in impact.cells.iter().enumerate() {
+        let MeasuredPoint { position: point, axes } = points[&(*group, cell.point)].clone();
         own.extend(point..point + 3);
-        let aimed = *group == Group::ArmB && priors.positions.aim_m > 0.0;
+        own.extend(axes.iter().flat_map(|axis| [axis.gain, axis.delay]));
+        own.extend(axes.iter().filter_map(|axis| axis.across).flat_map(|(at, _)| at..at + 2));
+        // the first cell with the same hits
+        let same = |(_, other): &(Group, &ContactCell<'_>)| {
+            other.records.iter().any(|record| cell.records.contains(record))
+        };
+        let first = impact.cells[..place].iter().position(same);
+        let aimed = *group == Group::ArmB && !cell.fixed && priors.positions.aim_m > 0.0;
         let shifts = !shifted_by.is_empty() && priors.positions.aim_m > 0.0;
         let aim = |what: &str| {
             let name = format!("the {what}'s aim in {} × {}", impact.name, cell.point);
             Parameter::new(name, 0.0, priors.positions.aim_m, Cause::Aim)
         };
         let aimed = aimed.then(|| parameters.add((0..3).map(|_| aim("vibrometer"))));
-        let shift = shifts.then(|| parameters.add((0..2).map(|_| aim("hammer"))));
+        let shift = match first {
+            // one hit has one place
+            Some(first) => cells.get(first).and_then(|cell: &BlockCell| cell.shift),
+            None => shifts.then(|| parameters.add((0..2).map(|_| aim("hammer")))),
+        };
         own.extend(aimed.into_iter().flat_map(|at| at..at + 3));
         own.extend(shift.into_iter().flat_map(|at| at..at + 2));
-        let place = cells.len();
-        let channels = (0..CHANNELS).filter(|channel| !(alone && *channel == 2));
+        let spots = if cell.has_spots() && first.is_none() { 1..if alone { 2 } else { 3 } } else { 0..0 };
+        let of_all = (first.is_none()).then_some(0).into_iter().chain(spots);
+        let channels = of_all.chain(POINT..POINT + axes.len());
         rows.extend(channels.map(|channel| ChannelRow { cell: place, channel }));
-        cells.push(BlockCell { group: *group, point, aim: aimed, shift, unexplained: [0.0; 2] });
+        cells.push(BlockCell { group: *group, axes, point, aim: aimed, shift, unexplained: [0.0; 2] });
         lines.push(cell_values(cell, chosen, input.band_hz)?);
     }
     pool_lines(&mut lines).ok_or_else(|| ContactError::SingleHits { impact: impact.name.into() })?;
@@ -379,11 +486,50 @@ pub struct ContactCell<'a> {
     pub point_sigma_m: Option<f64>,
     /// Grouping of the response point: arm B's interface, or a specimen.
     pub point_grouping: Grouping,
-    /// The point's motion along x, y and z, then the velocity of the spots on A and B along z
-    /// (m/s), then the load cells' sum (N), with an exponential window of about [`SIGMA_PER_S`].
+    /// The directions along which the point is measured.
+    pub axes: Axes,
+    /// Whether a sensor is fixed to the point, with its own gains and delays; otherwise the 3-D
+    /// vibrometer visits it.
+    pub fixed: bool,
+    /// The records averaged: cells of one impact that share a record have the same hits.
+    pub records: &'a [i64],
+    /// The point's motion along its axes, then the velocity of the spots on A and B along z (m/s)
+    /// if the rig has them, then the load cells' sum (N), with an exponential window of about
+    /// [`SIGMA_PER_S`].
     pub spectra: &'a CrossSpectra,
     /// The physical quantity of the point's motion.
     pub quantity: MotionQuantity,
+}
+
+impl ContactCell<'_> {
+    /// Whether its spectra contain the spots next to the contact.
+    pub fn has_spots(&self) -> bool {
+        self.spectra.outputs() == self.axes.directions().len() + 3
+    }
+}
+
+/// One to three measured directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axes {
+    directions: [[f64; 3]; 3],
+    count: usize,
+}
+
+impl Axes {
+    /// x, y and z.
+    pub const XYZ: Self = Axes { directions: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], count: 3 };
+
+    /// From unit vectors; `None` if there are none or more than three.
+    pub fn new(directions: &[[f64; 3]]) -> Option<Self> {
+        let mut all = [[0.0; 3]; 3];
+        all.get_mut(..directions.len())?.copy_from_slice(directions);
+        (!directions.is_empty()).then_some(Axes { directions: all, count: directions.len() })
+    }
+
+    /// The unit vectors.
+    pub fn directions(&self) -> &[[f64; 3]] {
+        &self.directions[..self.count]
+    }
 }
 
 /// Damping of the exponential window that suits the contact best, 1/s.
@@ -394,23 +540,21 @@ pub struct ContactCell<'a> {
 /// from biases the fit.
 pub const SIGMA_PER_S: f64 = 50.0;
 
-/// Channels of a cell: T, spot B, spot A, then the point along x, y and z.
-pub(super) const CHANNELS: usize = 6;
+/// Index of a point's first axis among a cell's channels, after T, spot B and spot A.
+pub(super) const POINT: usize = 3;
 
-/// Index of each channel among a cell's spectra.
-const OUTPUT: [usize; CHANNELS] = [5, 4, 3, 0, 1, 2];
-
-/// A cell's values, per newton of the hammer: motion as displacement (m/N), force in N/N.
+/// A cell's values, per newton of the hammer: motion as displacement (m/N), force in N/N; by channel
+/// (T, spot B, spot A, then the point's axes). Those of absent spots are not numbers.
 #[derive(Debug, Clone)]
 pub(super) struct CellValues {
     /// By line and channel.
-    pub value: Vec<[Complex<f64>; CHANNELS]>,
+    pub value: Vec<Vec<Complex<f64>>>,
     /// Mean auto-spectrum of the force, by line (N² s²).
     pub force: Vec<f64>,
     /// Order of differentiation of each channel as it was measured.
-    pub order: [i32; CHANNELS],
+    pub order: Vec<i32>,
     /// Noise power of each channel as measured: the signal's variance per hit, (own unit × s)².
-    pub noise: [f64; CHANNELS],
+    pub noise: Vec<f64>,
     /// Kept hits.
     pub hits: usize,
 }
@@ -419,60 +563,75 @@ pub(super) struct CellValues {
 /// single line of a few hits hardly determines its noise.
 ///
 /// # Errors
-/// The spectra do not have six outputs, or have other lines.
+/// The spectra do not have one output for each axis, T, and perhaps the two spots, or have other
+/// lines.
 pub(super) fn cell_values(
     cell: &ContactCell<'_>,
     chosen: &[usize],
     band_hz: Band,
 ) -> Result<CellValues, ContactError> {
     let spectra = cell.spectra;
-    if spectra.outputs() != CHANNELS || chosen.iter().any(|l| *l >= spectra.lines()) {
+    let axes = cell.axes.directions().len();
+    let outputs: Vec<Option<usize>> = match spectra.outputs() {
+        n if n == axes + 1 => [Some(axes), None, None].into_iter().chain((0..axes).map(Some)).collect(),
+        n if n == axes + 3 => [axes + 2, axes + 1, axes].into_iter().chain(0..axes).map(Some).collect(),
+        _ => Vec::new(),
+    };
+    if outputs.is_empty() || chosen.iter().any(|l| *l >= spectra.lines()) {
         return Err(ContactError::Unlike { impact: cell.impact.into(), point: cell.point.into() });
     }
     let response = cell.quantity.order_of_s();
-    let order = [0, 1, 1, response, response, response];
+    let order: Vec<i32> = [0, 1, 1].into_iter().chain(std::iter::repeat_n(response, axes)).collect();
     let inside: Vec<usize> =
         (0..spectra.lines()).filter(|l| band_hz.contains(spectra.frequency_hz()[*l])).collect();
     let hits = spectra.hits() as f64;
-    let noise = std::array::from_fn(|c| {
+    let noise = |output: &Option<usize>| {
         // a single hit does not determine its noise
-        if spectra.hits() < 2 {
-            return f64::NAN;
-        }
+        let Some(output) = output.filter(|_| spectra.hits() >= 2) else { return f64::NAN };
         // of both parts, of one hit; the textbook formula divides by n where n − 1 is unbiased
         let scale = 2.0 * hits * hits / (hits - 1.0);
-        let power = |l: &usize| spectra.variance(*l, OUTPUT[c]) * spectra.force(*l) * scale;
+        let power = |l: &usize| spectra.variance(*l, output) * spectra.force(*l) * scale;
         inside.iter().map(power).sum::<f64>() / inside.len() as f64
-    });
-    let line = |&l: &usize| std::array::from_fn(|c| spectra.h1(l, OUTPUT[c]) / spectra.s(l).powi(order[c]));
+    };
+    let line = |&l: &usize| {
+        let value = |(output, order): (&Option<usize>, &i32)| {
+            output.map_or(Complex::from(f64::NAN), |output| spectra.h1(l, output) / spectra.s(l).powi(*order))
+        };
+        outputs.iter().zip(&order).map(value).collect()
+    };
     Ok(CellValues {
         value: chosen.iter().map(line).collect(),
         force: chosen.iter().map(|l| spectra.force(*l)).collect(),
+        noise: outputs.iter().map(noise).collect(),
         order,
-        noise,
         hits: spectra.hits(),
     })
 }
 
 /// Averages the noise over channels that share an instrument and its distance: the spots and the
-/// load cells over all cells of an impact, the three axes of the vibrometer within each cell. A
-/// cell with a single hit has no noise estimate, so its point gets the mean noise of the impact's
-/// other points. None if no cell has two hits.
+/// load cells over all cells of an impact, the axes of the sensor within each cell. A cell with a
+/// single hit has no noise estimate, so its point gets the mean noise of the impact's other points.
+/// None if no cell has two hits.
 pub(super) fn pool_lines(cells: &mut [CellValues]) -> Option<()> {
+    let mean_of = |noises: &mut dyn Iterator<Item = f64>| {
+        let known: Vec<f64> = noises.filter(|noise| noise.is_finite()).collect();
+        (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64)
+    };
     for cell in cells.iter_mut() {
-        let mean = cell.noise[3..].iter().sum::<f64>() / 3.0;
-        cell.noise[3..].fill(mean);
+        let axes = &mut cell.noise[POINT..];
+        let mean = axes.iter().sum::<f64>() / axes.len() as f64;
+        axes.fill(mean);
     }
-    for channel in 0..CHANNELS {
-        let known: Vec<f64> =
-            cells.iter().map(|cell| cell.noise[channel]).filter(|n| n.is_finite()).collect();
-        if known.is_empty() {
-            return None;
+    for channel in 0..POINT {
+        match mean_of(&mut cells.iter().map(|cell| cell.noise[channel])) {
+            Some(mean) => cells.iter_mut().for_each(|cell| cell.noise[channel] = mean),
+            None if channel == 0 => return None,
+            None => {}
         }
-        let mean = known.iter().sum::<f64>() / known.len() as f64;
-        for cell in cells.iter_mut().filter(|cell| channel < 3 || !cell.noise[channel].is_finite()) {
-            cell.noise[channel] = mean;
-        }
+    }
+    let of_points = mean_of(&mut cells.iter().map(|cell| cell.noise[POINT]))?;
+    for cell in cells.iter_mut().filter(|cell| !cell.noise[POINT].is_finite()) {
+        cell.noise[POINT..].fill(of_points);
     }
     Some(())
 }

@@ -10,10 +10,10 @@
 //! specimen A's z is an independent coordinate and does not follow from T and the contact: the
 //! result must depend on the contact as measured, not on the contact that the hits found.
 
-use super::block::{Block, Group};
+use super::block::Block;
 use super::model::{A, LineModel, Sparse, T};
 use super::model::{Eliminated, eliminated};
-use super::parameters::{COMPLIANCE, DELAYS, GAINS, RETARDATION};
+use super::parameters::{COMPLIANCE, RETARDATION};
 use crate::C;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -258,14 +258,9 @@ fn solved(block: &Block, line: usize, p: &[f64], shifts: Option<[DVector<C>; 2]>
     let model = LineModel::new(block, &free, line.s);
     let (map, offsets) = model.map();
     let last = map.ncols();
-    let sensor = |channel: usize| (1.0 + p[GAINS + channel]) * (-line.s * p[DELAYS + channel]).exp();
     let mut map = map.insert_column(last, C::default());
     for (r, row) in block.rows.iter().enumerate() {
-        map[(r, last)] = match row.channel {
-            2 => sensor(0),
-            5 if block.cells[row.cell].group == Group::SpecimenA => sensor(4),
-            _ => C::default(),
-        };
+        map[(r, last)] = model.of_z_a(row);
     }
     let Eliminated { q, r, motion: x, .. } = eliminated(block, line, &map, &offsets, p, shifts.as_ref())?;
     let mut derivatives = model.derivatives(&x, shifts.as_ref(), &map);

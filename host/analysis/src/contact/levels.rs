@@ -125,7 +125,9 @@ pub fn level_stiffness(
     known: &Known,
     levels: &[SteadyLevel],
 ) -> Vec<Result<LevelStiffness, LevelError>> {
-    let spots = light.spots_m.map(|spot| std::array::from_fn(|axis| spot[axis] - light.contact_m[axis]));
+    let Some(spots) = light.spots_from_contact() else {
+        return levels.iter().map(|_| Err(ContactError::NoSpots.into())).collect();
+    };
     let mut parameters = Parameters::new(&light.priors, START_M_PER_N, spots);
     let blocks = match blocks(&Input { band_hz: LEVEL_LINES, ..light.clone() }, &mut parameters) {
         Ok(blocks) if parameters.all().len() == known.p.len() => blocks,

@@ -155,10 +155,13 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
             point_sigma_m: None,
             point_grouping: if on_arm { Grouping::InterfaceB } else { Grouping::SpecimenA },
             spectra: &own.spectra,
+            axes: Axes::XYZ,
+            fixed: false,
+            records: &[],
             quantity: MotionQuantity::Velocity,
         }
     });
-    Input { cells: cells.collect(), contact_m: [0.0; 3], spots_m: SPOTS, priors, band_hz: BAND }
+    Input { cells: cells.collect(), contact_m: [0.0; 3], spots_m: Some(SPOTS), priors, band_hz: BAND }
 }
 
 /// Twenty newtons at the mass, at the stated position of its hit.

@@ -10,7 +10,8 @@
 //!    which covers any mass, rod and load-cell gain. In the assembly the same form gives the
 //!    contact's force.
 //! 2. **Rotation.** Points on specimen A show its motion as a rigid body; arm B's points show that
-//!    of B.
+//!    of B. The points are those of a 3-D vibrometer, or fixed sensors (accelerometers) with known
+//!    positions and axes; then spots next to the contact are not needed.
 //! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells
 //!    together. The motion of the bodies is eliminated at every line (`model`), so that noise in
 //!    the signals that the force is formed from does not pull k_T down. Spots, points, gains,
@@ -33,6 +34,8 @@ use std::f64::consts::TAU;
 
 mod block;
 mod driven;
+#[cfg(test)]
+mod fixed_tests;
 mod levels;
 #[cfg(test)]
 mod levels_tests;
@@ -43,7 +46,7 @@ mod solver;
 #[cfg(test)]
 mod tests;
 
-pub use block::{ContactCell, SIGMA_PER_S};
+pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
 };
@@ -52,7 +55,7 @@ pub use parameters::{Cause, ContactPriors};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
-use block::{Block, Group, blocks};
+use block::{Block, Group, POINT, blocks};
 use nalgebra::DVector;
 use outcome::{Variances, of_sum, trusted};
 use parameters::{FORM, Parameters};
@@ -78,12 +81,21 @@ pub struct Input<'a> {
     pub cells: Vec<ContactCell<'a>>,
     /// Position of the contact, m: the virtual point.
     pub contact_m: [f64; 3],
-    /// Positions of the vibrometer spots next to the contact, on A and on B, m.
-    pub spots_m: [[f64; 3]; 2],
+    /// Positions of the vibrometer spots next to the contact, on A and on B, m; none if only the
+    /// points measure the specimens.
+    pub spots_m: Option<[[f64; 3]; 2]>,
     /// Prior knowledge.
     pub priors: ContactPriors,
     /// The band of the lines used.
     pub band_hz: Band,
+}
+
+impl Input<'_> {
+    /// Positions of the spots relative to the contact, m.
+    fn spots_from_contact(&self) -> Option<[[f64; 3]; 2]> {
+        let relative = |spot: [f64; 3]| std::array::from_fn(|axis| spot[axis] - self.contact_m[axis]);
+        self.spots_m.map(|spots| spots.map(relative))
+    }
 }
 
 /// The reason why there is no k_T.
@@ -92,18 +104,19 @@ pub struct Input<'a> {
 pub enum ContactError {
     /// No usable cell.
     #[error(
-        "no cell has the signals of the contact: hits along z on the assembly are needed, with load cells and both spots"
+        "no cell has the signals of the contact: hits along z on the assembly are needed, with a load cell"
     )]
     NoCells,
     /// The impacts that calibrate the force are missing.
     #[error(
-        "the force at the contact is not known: hit B alone along z at three points or more, each with three points of arm B's interface (grouping 2)"
+        "the force at the contact is not known: hit B alone along z at three points or more, each with three points of arm B's interface (grouping 2), or with fixed sensors whose axes determine all six motions of arm B"
     )]
     NoForce,
     /// The points that determine the specimen's rotation are missing.
     #[error(
         "the specimen's rotation is not known: its tilt between contact and spot cannot be distinguished from the contact's own compliance. Measure three points \
-         or more on specimen A (grouping 5) in the assembly, with three of arm B's interface (grouping 2), from hits along z on A or on the moving mass"
+         or more on specimen A (grouping 5) in the assembly, with three of arm B's interface (grouping 2), from hits along z on A or on the moving mass; \
+         or fix sensors to both whose axes determine all six motions of each"
     )]
     NoRotation,
     /// The positions of the spots are missing.
@@ -205,8 +218,12 @@ impl Fit {
 }
 
 fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
-    let spots = input.spots_m.map(|spot| std::array::from_fn(|axis| spot[axis] - input.contact_m[axis]));
-    let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots);
+    let spots = input.spots_from_contact();
+    if spots.is_none() && input.cells.iter().any(ContactCell::has_spots) {
+        return Err(ContactError::NoSpots);
+    }
+    // without spots no signal depends on their positions
+    let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default());
     let mut blocks = blocks(input, &mut parameters)?;
     if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
         return Err(ContactError::NoForce);
@@ -244,8 +261,14 @@ fn scale_form(parameters: &mut Parameters, blocks: &[Block]) {
     let start = |at: usize| parameters.all()[at].start;
     for block in blocks.iter().filter(|b| b.along_z.is_some_and(|at| start(at).abs() > 0.5)) {
         let place = |channel| block.rows.iter().position(|row| row.cell == 0 && row.channel == channel);
-        if let (Some(t), Some(spot)) = (place(0), place(1)) {
-            stiffness.extend(block.lines.iter().map(|line| (line.value[t] / line.value[spot]).norm()));
+        // z of arm B: the spot, or an axis of a point along z
+        let along_z = block.rows.iter().position(|row| {
+            let cell = &block.cells[row.cell];
+            let axis = row.channel.checked_sub(POINT).map(|axis| &cell.axes[axis]);
+            cell.group == Group::ArmB && axis.is_some_and(|axis| axis.direction[2].abs() > 0.9)
+        });
+        if let (Some(t), Some(z)) = (place(0), place(1).or(along_z)) {
+            stiffness.extend(block.lines.iter().map(|line| (line.value[t] / line.value[z]).norm()));
         }
         for cell in block.cells.iter().filter(|cell| cell.group == Group::ArmB) {
             lever_m = lever_m.max(start(cell.point).hypot(start(cell.point + 1)));

@@ -8,7 +8,7 @@
 //! coordinate but follows from T and B's motion; on B alone, where F is the hammer's, T follows
 //! from B's motion.
 
-use super::block::{Block, BlockCell, BlockLine, Group};
+use super::block::{Axis, Block, BlockCell, BlockLine, ChannelRow, Group, POINT};
 use super::parameters::{
     COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS,
 };
@@ -106,9 +106,50 @@ impl<'a> LineModel<'a> {
         LineModel { t_offset: C::default(), hammer: 0.0, ..self }
     }
 
-    /// Gain and delay of a channel: spot A 0, spot B 1, the point's axes 2 to 4.
-    fn sensor(&self, channel: usize) -> C {
-        (1.0 + self.p[GAINS + channel]) * (-self.s * self.p[DELAYS + channel]).exp()
+    /// Effect of the gain and the delay with these indices.
+    fn sensor(&self, gain: usize, delay: usize) -> C {
+        (1.0 + self.p[gain]) * (-self.s * self.p[delay]).exp()
+    }
+
+    /// The same for a spot: A is 0, B is 1.
+    fn of_spot(&self, spot: usize) -> C {
+        self.sensor(GAINS + spot, DELAYS + spot)
+    }
+
+    /// The actual direction of an axis, including its sensitivity across it.
+    fn direction(&self, axis: &Axis) -> [f64; 3] {
+        let mut d = axis.direction;
+        if let Some((at, across)) = &axis.across {
+            for (k, across) in across.iter().enumerate() {
+                for (d, part) in d.iter_mut().zip(across) {
+                    *d += self.p[at + k] * part;
+                }
+            }
+        }
+        d
+    }
+
+    /// Displacement of a cell's point along x, y and z, and the indices of its body's rotations.
+    fn point(&self, cell: &BlockCell) -> ([Linear; 3], [usize; 3]) {
+        let r = self.position(cell);
+        let of = |axis: usize| {
+            let (translation, theta) = self.body(cell.group, axis);
+            turned(&translation, theta, r, axis)
+        };
+        ([of(0), of(1), of(2)], self.body(cell.group, 0).1)
+    }
+
+    /// Derivative of a row by specimen A's z at the contact.
+    pub fn of_z_a(&self, row: &ChannelRow) -> C {
+        let cell = &self.block.cells[row.cell];
+        match row.channel {
+            2 => self.of_spot(0),
+            channel if channel >= POINT && cell.group == Group::SpecimenA => {
+                let axis = &cell.axes[channel - POINT];
+                self.sensor(axis.gain, axis.delay) * self.direction(axis)[2]
+            }
+            _ => C::default(),
+        }
     }
 
     fn position(&self, cell: &BlockCell) -> [f64; 3] {
@@ -154,13 +195,17 @@ impl<'a> LineModel<'a> {
             0 => self.t,
             1 | 2 => {
                 let (z, theta, place) = self.spot(channel == 2);
-                sum(&[(self.sensor(2 - channel), &turned(&z, theta, place, 2))])
+                sum(&[(self.of_spot(2 - channel), &turned(&z, theta, place, 2))])
             }
             _ => {
-                let (cell, axis) = (&self.block.cells[cell], channel - 3);
-                let (translation, theta) = self.body(cell.group, axis);
-                let moved = turned(&translation, theta, self.position(cell), axis);
-                sum(&[(self.sensor(2 + axis), &moved)])
+                let cell = &self.block.cells[cell];
+                let axis = &cell.axes[channel - POINT];
+                let (moved, _) = self.point(cell);
+                let factor = self.sensor(axis.gain, axis.delay);
+                let parts = self.direction(axis).map(|part| factor * part);
+                let terms: Vec<(C, &Linear)> =
+                    parts.into_iter().zip(&moved).filter(|(part, _)| *part != C::default()).collect();
+                sum(&terms)
             }
         }
     }
@@ -191,9 +236,9 @@ impl<'a> LineModel<'a> {
             let mut own = Sparse::with_capacity(24);
             let cell = &self.block.cells[row.cell];
             let seen: C = map.row(r).iter().zip(x.iter()).map(|(a, b)| a * b).sum();
-            let sensor = |channel: usize, own: &mut Sparse| {
-                own.push((local(GAINS + channel), seen / (1.0 + self.p[GAINS + channel])));
-                own.push((local(DELAYS + channel), -self.s * seen));
+            let sensor = |gain: usize, delay: usize, own: &mut Sparse| {
+                own.push((local(gain), seen / (1.0 + self.p[gain])));
+                own.push((local(delay), -self.s * seen));
             };
             match row.channel {
                 0 => {
@@ -206,8 +251,9 @@ impl<'a> LineModel<'a> {
                 }
                 1 | 2 => {
                     let of_a = row.channel == 2;
-                    sensor(2 - row.channel, &mut own);
-                    let factor = self.sensor(2 - row.channel);
+                    let spot = 2 - row.channel;
+                    sensor(GAINS + spot, DELAYS + spot, &mut own);
+                    let factor = self.of_spot(spot);
                     let (_, theta, _) = self.spot(of_a);
                     let at = SPOTS + if of_a { 0 } else { 2 };
                     own.push((local(at), -factor * x[theta[1]]));
@@ -217,17 +263,31 @@ impl<'a> LineModel<'a> {
                     }
                 }
                 channel => {
-                    let axis = channel - 3;
-                    sensor(2 + axis, &mut own);
-                    let factor = self.sensor(2 + axis);
-                    let (_, theta) = self.body(cell.group, axis);
-                    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-                    for base in std::iter::once(cell.point).chain(cell.aim) {
-                        own.push((local(base + last), factor * x[theta[next]]));
-                        own.push((local(base + next), -factor * x[theta[last]]));
+                    let axis = &cell.axes[channel - POINT];
+                    sensor(axis.gain, axis.delay, &mut own);
+                    let factor = self.sensor(axis.gain, axis.delay);
+                    let d = self.direction(axis);
+                    let (moved, theta) = self.point(cell);
+                    // d · (θ × r) = r · (d × θ)
+                    for place in 0..3 {
+                        let (next, last) = ((place + 1) % 3, (place + 2) % 3);
+                        let by = factor * (d[next] * x[theta[last]] - d[last] * x[theta[next]]);
+                        if by != C::default() {
+                            for base in std::iter::once(cell.point).chain(cell.aim) {
+                                own.push((local(base + place), by));
+                            }
+                        }
                     }
-                    if cell.group == Group::SpecimenA && axis == 2 {
-                        of_z_a(factor, &mut own);
+                    if let Some((at, across)) = &axis.across {
+                        for (k, across) in across.iter().enumerate() {
+                            let along: C =
+                                across.iter().zip(&moved).map(|(part, of)| part * dot(of, x)).sum();
+                            own.push((local(at + k), factor * along));
+                        }
+                    }
+                    let of_z = self.of_z_a(row);
+                    if of_z != C::default() {
+                        of_z_a(of_z, &mut own);
                     }
                 }
             }

@@ -120,6 +120,9 @@ pub struct Interval {
     pub ci95: [f64; 2],
 }
 
+/// A relative share of the uncertainty below this is rounding: the cause does not affect the signals.
+const ROUNDING: f64 = 1e-9;
+
 /// Variances by cause, in the squared unit of the uncertain quantity; they add up.
 pub type Variances = BTreeMap<Cause, f64>;
 
@@ -169,7 +172,8 @@ pub fn stiffness_of(
     }
     let ci95 = [1.0 / (compliance + half), 1.0 / (compliance - half)];
     let shares = variances.into_iter().map(|(cause, variance)| (cause, variance.sqrt() / compliance));
-    Ok((Interval { mean: 1.0 / compliance, ci95 }, shares.filter(|(_, share)| *share > 0.0).collect()))
+    let counts = |share: &(Cause, f64)| share.1 > ROUNDING;
+    Ok((Interval { mean: 1.0 / compliance, ci95 }, shares.filter(counts).collect()))
 }
 
 /// χ² per degree of freedom above which a kind of signal contradicts the model, allowing for the

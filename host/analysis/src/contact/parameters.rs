@@ -169,11 +169,14 @@ pub struct ContactPriors {
     pub hammer_gain: f64,
     /// Delay of each vibrometer and axis relative to the hammer, beyond what the device reports, s.
     pub skew_s: f64,
+    /// Sensitivity of each axis of a fixed sensor to motion along each of the two directions across
+    /// it, relative: the tilt of its mounting (rad) and its own transverse sensitivity.
+    pub transverse: f64,
 }
 
 impl Default for ContactPriors {
     /// Spots placed to 0.05 mm, points on specimens to 0.3 mm, gains calibrated to 0.5 %, delays
-    /// known to 2 µs.
+    /// known to 2 µs, axes of fixed sensors to 0.02 (about one degree).
     fn default() -> Self {
         ContactPriors {
             positions: Positions::default(),
@@ -182,6 +185,7 @@ impl Default for ContactPriors {
             gain: 5e-3,
             hammer_gain: 5e-3,
             skew_s: 2e-6,
+            transverse: 0.02,
         }
     }
 }
@@ -206,6 +210,8 @@ pub enum Cause {
     Gains,
     /// Delays between the channels.
     Skew,
+    /// The directions of the fixed sensors' axes.
+    SensorAxes,
     /// The model does not describe the signals down to their noise.
     Misfit,
 }
@@ -222,6 +228,7 @@ impl Cause {
             Cause::HammerTilt => "hammer-tilt",
             Cause::Gains => "gains",
             Cause::Skew => "skew",
+            Cause::SensorAxes => "sensor-axes",
             Cause::Misfit => "misfit",
         }
     }

@@ -51,7 +51,19 @@ struct Cell {
     spectra: CrossSpectra,
 }
 
-fn moved(t: [C; 3], turn: [C; 3], r: [f64; 3]) -> [C; 3] {
+/// Six motions of B and six of A at s, from 24 numbers between 0 and 1: their compliances and
+/// resonance frequencies.
+pub(super) fn motion(draw: &[f64], s: C) -> ([C; 6], [C; 6]) {
+    let mode = |n: usize, scale: f64| {
+        let w = TAU * (150.0 + 900.0 * draw[n]);
+        scale * (0.3 + draw[12 + n]) / (1.0 + s * s / (w * w) + s * 3e-5)
+    };
+    let b = std::array::from_fn(|n| mode(n, if n < 3 { 6e-9 } else { 1e-7 }));
+    let a = std::array::from_fn(|n| mode(6 + n, if n < 3 { 9e-9 } else { 4e-7 }));
+    (b, a)
+}
+
+pub(super) fn moved(t: [C; 3], turn: [C; 3], r: [f64; 3]) -> [C; 3] {
     [
         t[0] + turn[1] * r[2] - turn[2] * r[1],
         t[1] + turn[2] * r[0] - turn[0] * r[2],
@@ -71,15 +83,6 @@ fn measured(world: World) -> Vec<Cell> {
             let along_z = if impact < 3 { -1.0 } else { 0.0 };
             // compliances and resonance frequencies of six motions of B and six of A
             let draw: Vec<f64> = (0..24).map(|_| random.random::<f64>()).collect();
-            let mode = |n: usize, s: C, scale: f64| {
-                let w = TAU * (150.0 + 900.0 * draw[n]);
-                scale * (0.3 + draw[12 + n]) / (1.0 + s * s / (w * w) + s * 3e-5)
-            };
-            let motion = |s: C| {
-                let b: [C; 6] = std::array::from_fn(|n| mode(n, s, if n < 3 { 6e-9 } else { 1e-7 }));
-                let a: [C; 6] = std::array::from_fn(|n| mode(6 + n, s, if n < 3 { 9e-9 } else { 4e-7 }));
-                (b, a)
-            };
             let (points, specimens): (usize, usize) = (3, if structure == Structure::Ajb { 6 } else { 0 });
             for point in 0..points + specimens {
                 let on_specimen = point >= points;
@@ -87,7 +90,7 @@ fn measured(world: World) -> Vec<Cell> {
                 let mut s_ff = Vec::new();
                 for &f in &frequency_hz {
                     let s = line(f);
-                    let (b, a) = motion(s);
+                    let (b, a) = motion(&draw, s);
                     let form = b[2] * (BESIDE + MASS * s * s) + b[3] * MASS * LEVER_M * s * s;
                     let force = if structure == Structure::B { C::from(along_z) } else { C::from(1.3) };
                     let t = force - form;
@@ -170,6 +173,9 @@ fn of(cell: &Cell) -> ContactCell<'_> {
         point_sigma_m: None,
         point_grouping: if cell.on_specimen { Grouping::SpecimenA } else { Grouping::InterfaceB },
         spectra: &cell.spectra,
+        axes: Axes::XYZ,
+        fixed: false,
+        records: &[],
         quantity: MotionQuantity::Velocity,
     }
 }
@@ -184,7 +190,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
     Input {
         cells: cells.iter().map(of).collect(),
         contact_m: [0.0; 3],
-        spots_m: SPOTS,
+        spots_m: Some(SPOTS),
         priors,
         band_hz: BAND,
     }

@@ -5,7 +5,11 @@
     y = lab.frf("AJB")                     # y.frf (line, output, input) complex128, SI per N
     found = lab.analyse()                  # found.results: what `jointrig analyse` writes to results.json
 
-All arrays are numpy's, all units SI. Nothing writes into a campaign file, and no device can be opened from here.
+    lab = jr.new("own.jrig", "plan.toml")  # a campaign measured with other equipment:
+    lab.add_hits("AJB", "AZ1", "S1", fs_hz=51_200, force_n=force, channels={...}, units={...})
+
+All arrays are numpy's, all units SI unless stated. Hits and levels can be added to a campaign file; no device can be opened from here.
+`jointrig.bridge` makes a program a recorder that the command measures with.
 """
 
 from __future__ import annotations
@@ -37,6 +41,7 @@ __all__ = [
     "hysteresis",
     "identify",
     "make_frf",
+    "new",
     "open",
     "read_frf",
 ]
@@ -45,8 +50,16 @@ Path = str | os.PathLike[str]
 
 
 def open(path: Path) -> Lab:  # noqa: A001
-    """A campaign file, read only; it may be measured meanwhile. Raises FileError where it cannot be read."""
+    """A campaign file; it may be measured meanwhile, and is opened for writing only while hits or levels are added. Raises FileError where it cannot be read."""
     return Lab(os.fspath(path))
+
+
+def new(path: Path, plan: Path) -> Lab:
+    """A new campaign file for a plan (TOML, as `jointrig plan new` writes it), for hits and levels that are added.
+
+    Raises FileError where the file exists or cannot be written, DataError where the plan is wrong.
+    """
+    return _native.new(os.fspath(path), os.fspath(plan))
 
 
 def analyse(lab: Lab | Path, progress: Callable[[int, int], object] | None = None, *, bootstrap: int = 0) -> Analysis:

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __version__: str
-__all__ = ["__version__", "Lab", "Record", "Frf", "Analysis", "frf", "identify", "hysteresis"]
+__all__ = ["__version__", "Lab", "Record", "Frf", "Analysis", "new", "frf", "identify", "hysteresis"]
 
 @final
 class Lab:
@@ -25,6 +25,53 @@ class Lab:
     ) -> list[Record]: ...
     def frf(self, configuration: str, *, band_hz: tuple[float, float] = ...) -> Frf: ...
     def analyse(self, progress: Callable[[int, int], object] | None = None, *, bootstrap: int = 0) -> Analysis: ...
+    def add_hits(
+        self,
+        configuration: str,
+        impact: str,
+        response: str | None = None,
+        *,
+        fs_hz: float,
+        channels: dict[str, Any],
+        force_n: ArrayLike | None = None,
+        units: dict[str, str] | None = None,
+        scale: dict[str, float] | None = None,
+        delay_s: dict[str, float] | None = None,
+        trigger_index: int | None = None,
+        source: str = "python",
+        replace: bool = False,
+    ) -> dict[str, Any]:
+        """Adds hits of one cell, judged and stored like measured ones.
+
+        channels: name -> (hit, sample), int16, int32, float32 or float64, stored as they are. The name says what a channel
+        is, as in the plan or in exports: force, x, y, z of the response location, LDV_A, LDV_B, LC1 ..., or a fixed sensor's
+        channel; any other is recorded without a use. force_n: the hammer's force in N, the same as channels={"force": ...}.
+        units: name -> N, m/s, mm/s, g, V ...; scale: name -> units per sample, for codes; delay_s: name -> how late, s.
+        trigger_index: the sample at which the recorder was triggered; hits whose pulse begins elsewhere are refused. Left out,
+        each record is aligned by its pulse. response may be left out where all locations have fixed sensors. Returns hits, kept, already (stored by an earlier call
+        with the same arrays) and verdicts, a list of (verdict, sentence). source names the origin in the file; replace drops
+        the good hits that came from another content with this name. Raises Refused, and stores nothing then.
+        """
+    def add_level(
+        self,
+        frequency_hz: float,
+        amplitude: float,
+        *,
+        fs_hz: float,
+        channels: dict[str, Any],
+        units: dict[str, str] | None = None,
+        scale: dict[str, float] | None = None,
+        delay_s: dict[str, float] | None = None,
+        end_hz: float | None = None,
+        held: str = "displacement",
+        when: str = "before",
+        source: str = "python",
+    ) -> dict[str, Any]:
+        """Adds one level of the shaker: channels as for add_hits, but (sample,), with LDV_A, LDV_B and the load cells.
+
+        amplitude: what was asked for, m, N or V as held says ("displacement", "force", "drive"); end_hz for a sweep; when:
+        "before" or "after" the hits. Returns level (its number), reached (the measured amplitude) and already.
+        """
     def report(self, folder: str | os.PathLike[str]) -> None: ...
     def _repr_svg_(self) -> str | None: ...
     def __reduce__(self) -> tuple[type[Lab], tuple[Path]]: ...
@@ -127,6 +174,7 @@ class Analysis:
     def report(self, folder: str | os.PathLike[str]) -> None: ...
     def _repr_svg_(self) -> str | None: ...
 
+def new(path: str | os.PathLike[str], plan: str | os.PathLike[str]) -> Lab: ...
 def frf(
     *,
     fs_hz: float,

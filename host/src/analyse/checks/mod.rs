@@ -14,10 +14,12 @@ use crate::substructuring::identify::{Identification, Internals};
 use crate::substructuring::{BandStatistic, Dof, JointSpectrum, Method, Refused};
 
 pub use hidden_resonance::HiddenResonance;
+pub use sensor_masses::SensorMasses;
 pub use series_compliance::{SeriesCompliance, Sizes, at_the_specimens, between_the_arms};
 
 pub mod contact_change;
 mod hidden_resonance;
+mod sensor_masses;
 mod series_compliance;
 
 /// Fraction of the motion added by coupling that six rigid motions must explain.

@@ -218,6 +218,10 @@ fn described(
         Some(Stated { name: Some(name), .. }) => name,
         None => in_file,
     };
+    // records find the channels of fixed sensors by the plan's spelling
+    let mut fixed =
+        plan.geometry.response.iter().filter_map(|point| point.get_ref().channels.as_ref()).flatten();
+    let name = fixed.find(|own| same_name(own, name)).unwrap_or(name);
     let remedy = format!(
         "state its sensor with --calibrate '{in_file}=NAME:SENSITIVITY', e.g. '{in_file}=hammer:2.25 mV/N'"
     );

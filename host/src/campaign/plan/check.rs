@@ -4,6 +4,7 @@
 use super::faults::Faults;
 use super::sensor::{ResponsePoint, check_sensors};
 use super::{ConfigurationPlan, Plan, configuration_name, configuration_named, turned};
+use crate::contact::determines_motion;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use jointrig_protocol::request::Configuration;
 use std::collections::{BTreeSet, HashSet};
@@ -318,24 +319,29 @@ impl Plan {
     /// What is missing for the contact's own k_T; empty if nothing is.
     pub fn contact_needs(&self) -> Vec<String> {
         let mut needs = Vec::new();
-        let struck_b = self.blocks(Configuration::B).filter(|block| self.seen(block, &[2]) >= BODY);
+        let struck_b = self.blocks(Configuration::B).filter(|block| self.known(block, 2));
         let struck_b: usize = struck_b.map(|block| self.hit_along_z(block, &[2, 4]).len()).sum();
         if struck_b < BODY {
             needs.push(format!(
-                "hits along z on B alone at {BODY} places or more, each with {BODY} points of arm B (grouping 2); there are {struck_b}"
+                "hits along z on B alone at {BODY} places or more, each with sensors that determine the motion of arm B (grouping 2: \
+                 {BODY} points along x, y and z that are not in a line, or fixed sensors); there are {struck_b}"
             ));
         }
-        let struck = |groupings: &[u8]| -> BTreeSet<&str> {
-            let seeing = self.blocks(Configuration::Ajb).filter(|block| self.seen(block, groupings) >= BODY);
+        let struck = |grouping: u8| -> BTreeSet<&str> {
+            let seeing = self.blocks(Configuration::Ajb).filter(|block| self.known(block, grouping));
             seeing.flat_map(|block| self.hit_along_z(block, &[1, 3])).collect()
         };
-        if struck(&[5]).intersection(&struck(&[2])).next().is_none() {
+        if struck(5).intersection(&struck(2)).next().is_none() {
             needs.push(format!(
-                "a hit along z on A in AJB with {BODY} points of specimen A (grouping 5) and {BODY} of arm B (grouping 2)"
+                "a hit along z on A in AJB with sensors that determine the motion of specimen A (grouping 5) and of arm B \
+                 (grouping 2): {BODY} points along x, y and z that are not in a line, or fixed sensors, on each"
             ));
         }
-        for spot in ["LDV_A", "LDV_B"] {
-            if !self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == spot) {
+        // lasers next to the contact are not needed, but one alone was probably forgotten
+        let spots = ["LDV_A", "LDV_B"]
+            .map(|spot| (spot, self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == spot)));
+        for (spot, stated) in spots {
+            if !stated && spots.iter().any(|(_, stated)| *stated) {
                 needs.push(format!("the position of {spot} in geometry.sensor"));
             }
         }
@@ -387,9 +393,14 @@ impl Plan {
         names.filter(|name| wanted(name)).collect::<BTreeSet<&str>>().len()
     }
 
-    /// Number of responses of a block that belong to these groupings.
-    fn seen(&self, block: &ConfigurationPlan, groupings: &[u8]) -> usize {
-        block.responses.iter().filter(|name| self.response_is(name.get_ref(), groupings)).count()
+    /// Whether the responses of a block that belong to this grouping determine the motion of a
+    /// rigid body.
+    fn known(&self, block: &ConfigurationPlan, grouping: u8) -> bool {
+        let points = block.responses.iter().filter_map(|name| self.response(name.get_ref()));
+        let sensors = points
+            .filter(|point| point.grouping == grouping)
+            .flat_map(|point| point.axes().into_iter().map(|(_, direction)| (point.position_m, direction)));
+        determines_motion(&sensors.collect::<Vec<_>>())
     }
 
     /// The impacts of a block on these groupings that push along z.
@@ -415,13 +426,18 @@ impl Plan {
 
 #[cfg(test)]
 mod tests {
-    use crate::campaign::plan::{CONTACT, PAPER, PAPER_CONTACT, Plan, SMALL};
+    use crate::campaign::plan::{CONTACT, CONTACT_BY_HAND, FRF_ONLY, PAPER, PAPER_CONTACT, Plan, SMALL};
 
     #[test]
     fn the_plans_answer_what_they_were_made_for() {
-        for (text, contact, between) in
-            [(CONTACT, true, false), (PAPER, false, true), (PAPER_CONTACT, true, true), (SMALL, false, false)]
-        {
+        for (text, contact, between) in [
+            (CONTACT, true, false),
+            (CONTACT_BY_HAND, true, false),
+            (FRF_ONLY, false, false),
+            (PAPER, false, true),
+            (PAPER_CONTACT, true, true),
+            (SMALL, false, false),
+        ] {
             let plan = Plan::parse(text, "plan").expect("a good plan");
             let told = (plan.contact_needs(), plan.between_arms_needs());
             assert_eq!((told.0.is_empty(), told.1.is_empty()), (contact, between), "{told:?}");

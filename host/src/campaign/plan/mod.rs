@@ -32,6 +32,10 @@ pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
 pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
 /// The paper's campaign and the cells on the specimen: yields both stiffnesses.
 pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
+/// The contact's own stiffness without lasers: a manual hammer and accelerometers.
+pub const CONTACT_BY_HAND: &str = include_str!("../../../../docs/plans/contact-by-hand.toml");
+/// FRFs of one structure with a manual hammer and fixed accelerometers.
+pub const FRF_ONLY: &str = include_str!("../../../../docs/plans/frf-only.toml");
 /// A plan of a few cells.
 pub const SMALL: &str = include_str!("../../../../docs/plans/small.toml");
 
@@ -407,6 +411,9 @@ pub struct PriorsPlan {
     pub hammer_gain: Option<f64>,
     /// Delays in addition to those that the device reports, s.
     pub skew_s: Option<f64>,
+    /// Sensitivity of each axis of a fixed sensor to motion across it, relative: the tilt of its
+    /// mounting in rad, and its own.
+    pub transverse: Option<f64>,
 }
 
 impl PriorsPlan {
@@ -422,6 +429,7 @@ impl PriorsPlan {
             (self.gain, &mut known.gain),
             (self.hammer_gain, &mut known.hammer_gain),
             (self.skew_s, &mut known.skew_s),
+            (self.transverse, &mut known.transverse),
         ] {
             if let Some(stated) = stated {
                 *at = stated;
@@ -431,7 +439,7 @@ impl PriorsPlan {
     }
 
     /// The stated values, by name.
-    pub fn stated(&self) -> [(&'static str, Option<f64>); 8] {
+    pub fn stated(&self) -> [(&'static str, Option<f64>); 9] {
         [
             ("position_m", self.position_m),
             ("aim_m", self.aim_m),
@@ -441,6 +449,7 @@ impl PriorsPlan {
             ("gain", self.gain),
             ("hammer_gain", self.hammer_gain),
             ("skew_s", self.skew_s),
+            ("transverse", self.transverse),
         ]
     }
 }

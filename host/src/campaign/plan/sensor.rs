@@ -176,6 +176,8 @@ const WORST_TILT_RAD: f64 = 0.5;
 const WORST_GAIN: f64 = 0.5;
 /// Largest plausible delay error, s: catches µs and ms.
 const WORST_SKEW_S: f64 = 0.01;
+/// Largest plausible mass of a sensor, g.
+const HEAVIEST_G: f64 = 500.0;
 /// Largest plausible force of a hammer of this kind, N.
 const HARDEST_N: f64 = 1e5;
 /// Exponential window that leaves nothing after a millisecond, 1/s.
@@ -248,7 +250,7 @@ impl Plan {
         for (name, value) in priors.get_ref().stated() {
             let (most, unit) = match name {
                 "hammer_angle_rad" => (WORST_TILT_RAD, "rad"),
-                "gain" | "hammer_gain" => (WORST_GAIN, "relative, 0.01 for 1 %"),
+                "gain" | "hammer_gain" | "transverse" => (WORST_GAIN, "relative, 0.01 for 1 %"),
                 "skew_s" => (WORST_SKEW_S, "s"),
                 _ => (WORST_PLACING_M, "m"),
             };
@@ -296,6 +298,17 @@ impl Plan {
         }
         for point in &geometry.response {
             let (point, at) = (point.get_ref(), point.span().start);
+            let heavy = |mass_g: f64| !(0.0..=HEAVIEST_G).contains(&mass_g);
+            faults.unless(
+                !point.mass_g.is_some_and(heavy),
+                at,
+                format!("geometry: mass_g of `{}` must be 0 to {HEAVIEST_G}: it is in grams", point.name),
+            );
+            faults.unless(
+                point.mass_g.is_none() || point.channels.is_some(),
+                at,
+                format!("geometry: mass_g of `{}` is that of a fixed sensor: list its channels", point.name),
+            );
             faults.unless(
                 point.sigma_m.is_none_or(|sigma_m| sigma_m <= WORST_PLACING_M),
                 at,
@@ -355,6 +368,8 @@ pub struct ResponsePoint {
     /// connected: all such sensors measure every hit simultaneously. If absent, the vibrometer is
     /// aimed at this point.
     pub channels: Option<Vec<String>>,
+    /// Mass of the fixed sensor, g.
+    pub mass_g: Option<f64>,
 }
 
 impl ResponsePoint {

@@ -19,7 +19,7 @@ fn the_papers_plan_has_252_cells_and_2016_hits() {
 
 #[test]
 fn hammer_and_laser_move_as_little_as_they_can() {
-    for text in [PAPER, DEMO, SMALL, CONTACT, PAPER_CONTACT] {
+    for text in [PAPER, DEMO, SMALL, CONTACT, CONTACT_BY_HAND, FRF_ONLY, PAPER_CONTACT] {
         let plan = Plan::parse(text, "plan").expect("a good plan");
         let cells = plan.cells();
         let moves = |of: fn(&Cell) -> String| cells.windows(2).filter(|w| of(&w[0]) != of(&w[1])).count();
@@ -213,7 +213,7 @@ fn what_no_plan_can_mean_is_refused_for_a_new_campaign_and_read_in_an_old_one() 
         let said = Plan::parse_new(&format!("{SMALL}\n[priors]\n{priors}\n"), "my.toml").expect_err(priors);
         assert!(said.to_string().contains(word), "{said}");
     }
-    for text in [PAPER, DEMO, SMALL, CONTACT, PAPER_CONTACT] {
+    for text in [PAPER, DEMO, SMALL, CONTACT, CONTACT_BY_HAND, FRF_ONLY, PAPER_CONTACT] {
         Plan::parse_new(text, "plan").expect("a good plan");
     }
 }

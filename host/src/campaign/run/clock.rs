@@ -57,6 +57,11 @@ impl ScanClock {
         }
     }
 
+    /// The device delivers blocks of up to `block` scans.
+    pub(super) fn widen(&mut self, block: usize) {
+        self.block_s = self.block_s.max(block as f64 / self.rate_hz);
+    }
+
     /// Adds a mark: the device answered `next_scan` to a question.
     pub(super) fn mark(&mut self, next_scan: u64, asked: Instant, answered: Instant) {
         let since = |moment: Instant| moment.saturating_duration_since(self.start).as_secs_f64();

@@ -40,6 +40,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
 use crate::device::stream::Accounts;
 use crate::device::stream::Recording;
+use jointrig_protocol::channel::{Role, words_per_scan};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -146,17 +147,22 @@ pub fn run(
         None => true,
     });
     let mut forces = Forces::new(plan.force.get_ref(), info.coil_cap_us);
-    for record in records.iter().flatten() {
+    // a hammer by hand has no coil, and the longest pulse of its device may be 0
+    let swung_by_coil = records.iter().flatten().filter(|_| plan.by_hand().is_none());
+    for record in swung_by_coil {
         forces
             .learn_judged(record.verdict, PulseHit { pulse_us: record.shot.pulse_us, peak_n: record.peak_n });
     }
-    session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
-    let (epoch, _) = session.start(channels.len())?;
+    // a front end with fewer load cells has no matrix for three
+    if channels.places(Role::LoadCell).len() == LOAD_CELLS {
+        session.set_load_cells([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])?;
+    }
+    let (epoch, _) = session.start(&channels)?;
     let shooter = Shooter::new(session, &plan, epoch)?;
     let simulated = is_simulated_board(&info.board);
     options.watch.saw(&Seen::Stream { channels: &channels, simulated });
     options.watch.saw(&Seen::Begun { wanted: tally.wanted(), kept: tally.kept() });
-    let block = jointrig_protocol::limits::scans_per_block(channels.len()).unwrap_or(1);
+    let block = jointrig_protocol::limits::scans_per_block(words_per_scan(&channels.channels)).unwrap_or(1);
     let mut runner = Runner {
         plan: &plan,
         channels: &channels,
@@ -169,7 +175,7 @@ pub fn run(
         judge,
         shooter,
         forces,
-        clock: ScanClock::new(f64::from(channels.rate_hz), block),
+        clock: ScanClock::new(channels.fs_hz(), block),
         keeper: Keeper::start(store, options.edits.clone(), options.watch.clone()),
         session_id: id,
         tally,
@@ -179,6 +185,9 @@ pub fn run(
     let walked = runner.walk();
     runner.end(walked)
 }
+
+/// Number of load cells whose calibration matrix a device holds.
+const LOAD_CELLS: usize = 3;
 
 /// Hits between two readings of the temperature: some minutes, in which a laboratory's temperature
 /// changes negligibly.
@@ -274,6 +283,9 @@ impl Runner<'_> {
     pub(super) fn mark(&mut self) -> Result<(), RunError> {
         let asked = Instant::now();
         let next_scan = self.session.status()?.next_scan;
+        if let Some(recorder) = self.session.recorder() {
+            self.clock.widen(recorder.longest_block as usize);
+        }
         self.clock.mark(next_scan, asked, Instant::now());
         Ok(())
     }
@@ -334,8 +346,12 @@ impl Runner<'_> {
         still(self.keeper.edges(self.session_id, edges))
     }
 
-    /// Stores the controller's log lines.
+    /// Stores the controller's log lines, and what a person should know about the recorder.
     pub(super) fn keep_log(&mut self) -> Result<(), RunError> {
+        for remark in self.session.remarks() {
+            self.saw(&Seen::Remark(&remark));
+            still(self.keeper.log(remark))?;
+        }
         let lines = self.session.log_lines();
         lines.into_iter().try_for_each(|line| still(self.keeper.log(format!("controller: {line}"))))
     }

@@ -170,7 +170,7 @@ impl Shooter {
             number: self.number,
             pulse_us,
             not_before,
-            quiet_limits: quiet.iter().copied().take(jointrig_protocol::limits::MAX_CHANNELS).collect(),
+            quiet_limits: quiet.iter().copied().take(jointrig_protocol::limits::CHANNEL_CAPACITY).collect(),
             quiet_window: if quiet.iter().any(|limit| *limit > 0.0) { self.window } else { 0 },
             quiet_patience: self.patience as u32,
         })?;

@@ -1,5 +1,6 @@
 //! `import`: imports FRFs and impact records measured with other systems.
 
+mod cut;
 mod exported;
 mod folder;
 mod names;
@@ -15,8 +16,10 @@ use super::error::CliError;
 use super::output;
 use crate::analyse;
 use crate::campaign::archive::restore::is_archive;
+use crate::campaign::cut::Only;
 use crate::campaign::import::CellName;
 use crate::campaign::import::assign::Calibrations;
+use crate::campaign::plan::level::Moment;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::Verdict;
@@ -51,6 +54,11 @@ use names::Pattern;
 /// files may name impact and response in their labels; for all others a table (--names) states the
 /// content. The import adds to existing data; what is already present is not stored again, so the
 /// command may be repeated.
+///
+/// A continuous recording (npz with all channels) is cut with --cut: its hits are found, judged and
+/// fitted to the plan's order (--order plan) by the structure's response, or to a table (--table).
+/// What was found is told before it is stored; where a place is not certain, nothing is stored, and
+/// the message lists what to state.
 #[derive(Debug, Args)]
 pub struct Import {
     /// An npz or universal file, or a folder of them.
@@ -91,6 +99,31 @@ pub struct Import {
     /// and logs the replacement.
     #[arg(long, requires = "into")]
     replace: bool,
+    /// Cut a continuous recording into hits.
+    #[arg(long, requires = "into")]
+    cut: bool,
+    /// Continuous recording: the places were struck in this order; deviations are found or asked
+    /// about.
+    #[arg(long, value_enum, requires = "cut")]
+    order: Option<CutOrder>,
+    /// Continuous recording: a csv table with the columns hit (or time_s), configuration, impact,
+    /// response.
+    #[arg(long, value_name = "TABLE.csv", requires = "cut")]
+    table: Option<PathBuf>,
+    /// Continuous recording of the shaker: store its steady parts as levels, measured before or
+    /// after the cells.
+    #[arg(long, value_name = "before|after", requires = "cut", conflicts_with_all = ["order", "table"])]
+    levels: Option<Moment>,
+    /// Continuous recording: tell what was found, and store nothing.
+    #[arg(long, requires = "cut")]
+    dry_run: bool,
+}
+
+/// The order in which the places of a continuous recording were struck.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum CutOrder {
+    /// The plan's, as `jointrig campaign run` measures.
+    Plan,
 }
 
 pub(super) use names::universal_files;
@@ -103,6 +136,20 @@ impl Import {
     pub fn run(self) -> Result<(), CliError> {
         let (replace, units) = (self.replace, &self.units);
         match (&self.out, &self.into, &self.configuration, &self.impact, &self.response) {
+            (None, Some(into), ..) if self.cut => cut::import(&cut::Recorded {
+                file: &self.file,
+                into,
+                only: Only {
+                    configuration: self.configuration.as_deref(),
+                    impact: self.impact.as_deref(),
+                    response: self.response.as_deref(),
+                },
+                in_order: self.order == Some(CutOrder::Plan),
+                table: self.table.as_deref(),
+                dry_run: self.dry_run,
+                replace,
+                levels: self.levels,
+            }),
             (None, Some(into), None, None, None)
                 if self.names.is_none() && self.pattern.is_none() && is_archive(&self.file) =>
             {

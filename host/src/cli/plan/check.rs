@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 
 use crate::advice::quoted;
+#[cfg(feature = "sim")]
+use crate::analyse::expected::expected;
 use crate::analyse::places;
 use crate::campaign::plan::{Plan, PlanError};
 use crate::cli::error::CliError;
@@ -34,6 +36,10 @@ impl PlanCheck {
         let text = file::read(&self.file)?;
         let plan = Plan::parse_all(&text, &self.file.display().to_string()).map_err(|all| refused(&all))?;
         output::lines(told(&plan))?;
+        #[cfg(feature = "sim")]
+        if let Some(all) = plan.contact_needs().is_empty().then(|| expected(&plan)).flatten() {
+            output::lines(report::words::expected(&all))?;
+        }
         if !self.no_picture {
             let picture = self.picture.unwrap_or_else(|| beside(&self.file));
             draw(&plan, &picture)?;

@@ -55,6 +55,10 @@ pub struct New {
 enum Template {
     /// The contact's own k_T: 63 cells of two hits.
     Contact,
+    /// The same with a manual hammer and accelerometers instead of lasers: 13 places of ten hits.
+    ContactByHand,
+    /// FRFs of one structure with a manual hammer and fixed accelerometers.
+    FrfOnly,
     /// The paper's campaign, the stiffness between the arms: 252 cells of eight hits.
     Paper,
     /// Both: 276 cells.
@@ -67,6 +71,8 @@ impl Template {
     fn text(self) -> &'static str {
         match self {
             Template::Contact => plan::CONTACT,
+            Template::ContactByHand => plan::CONTACT_BY_HAND,
+            Template::FrfOnly => plan::FRF_ONLY,
             Template::Paper => plan::PAPER,
             Template::PaperContact => plan::PAPER_CONTACT,
             Template::Small => plan::SMALL,

@@ -2,6 +2,8 @@
 
 use super::number::{AnswerLine, BETWEEN, CLAMP, CONTACT};
 use super::number::{micro, short};
+#[cfg(feature = "sim")]
+use crate::analyse::expected::Expected;
 use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
 use crate::substructuring::between_arms::Basis as Estimate;
@@ -15,13 +17,6 @@ pub fn with_interval(k: &Interval) -> String {
 /// Why this k_T is credible, and what determines its interval; `levels` is the number of shaker
 /// levels used in addition to the hits.
 pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
-    let mut causes: Vec<(&Cause, &f64)> = budget.iter().collect();
-    causes.sort_by(|a, b| b.1.total_cmp(a.1));
-    let largest: Vec<String> = causes
-        .iter()
-        .take(2)
-        .map(|(cause, share)| format!("{} ({:.1} %)", of_cause(**cause), 100.0 * **share))
-        .collect();
     let beside = match levels {
         0 => String::new(),
         1 => " A level of the shaker, corrected by the hits, is included as well.".into(),
@@ -30,8 +25,38 @@ pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
     format!(
         "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, independent of \
          the clamps.{beside} Most of its uncertainty comes from {}.",
-        largest.join(" and ")
+        largest(budget)
     )
+}
+
+/// The two largest causes of uncertainty.
+fn largest(budget: &BTreeMap<Cause, f64>) -> String {
+    let mut causes: Vec<(&Cause, &f64)> = budget.iter().collect();
+    causes.sort_by(|a, b| b.1.total_cmp(a.1));
+    let told = |(cause, share): &(&Cause, &f64)| format!("{} ({:.1} %)", of_cause(**cause), 100.0 * **share);
+    causes.iter().take(2).map(told).collect::<Vec<_>>().join(" and ")
+}
+
+/// What a plan lets expect, contact by contact, with the assumptions.
+#[cfg(feature = "sim")]
+pub fn expected(all: &[Expected]) -> Vec<String> {
+    let mut lines = vec![
+        "expected interval of k_T (95 %), an estimate for a structure like the simulated rig: its masses and clamps, the plan's hits and [priors], \
+         accelerometers of 30 µg/√Hz (10 with a single axis) or lasers of 0.05 µm/s/√Hz, three load cells"
+            .to_owned(),
+    ];
+    lines.extend(all.iter().map(|one| {
+        let contact = format!("  a contact of {:.0} N/µm", micro(one.contact_n_per_m));
+        match &one.found {
+            Ok(found) => {
+                let [low, high] = found.k_t_n_per_m.ci95;
+                let half = 50.0 * (high - low) / found.k_t_n_per_m.mean;
+                format!("{contact}: ± {half:.1} %, most of it from {}", largest(&found.budget))
+            }
+            Err(why) => format!("{contact}: none. {}", capital(&why.to_string())),
+        }
+    }));
+    lines
 }
 
 fn of_cause(cause: Cause) -> &'static str {
@@ -44,6 +69,7 @@ fn of_cause(cause: Cause) -> &'static str {
         Cause::HammerTilt => "the hammer's tilt",
         Cause::Gains => "gains",
         Cause::Skew => "delays between channels",
+        Cause::SensorAxes => "the directions of the fixed sensors' axes",
         Cause::Misfit => "signals that the model does not explain",
     }
 }

@@ -10,7 +10,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::Interval;
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Joint, ONE_STRUCTURE,
-    Results, SAME_IN_ALL, SERIES_COMPLIANCE, UNCHANGED, headline_rank,
+    Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, UNCHANGED, headline_rank,
 };
 use crate::substructuring::{Dof, fit};
 
@@ -109,6 +109,10 @@ pub fn failed(check: &Check) -> String {
             "The clamps give way: what is found between the arms is softer than the contact.".into()
         }
         HAMMER_SLIP => "The contact slips under the hammer.".into(),
+        SENSOR_MASSES => {
+            "A sensor on B was measured on B alone or in the assembly, but not in both: its mass changes k_T."
+                .into()
+        }
         UNCHANGED => "The contact is not the same after the hits as before.".into(),
         INTERFACE_MODES => "Six rigid motions do not describe what couples the parts.".into(),
         INTERNALS => "The points away from the interface do not suffice for every method.".into(),

@@ -4,15 +4,15 @@ use super::number::{decimals, micro, short};
 use crate::analyse::Findings;
 use crate::analyse::checks::contact_change::ContactChange;
 use crate::analyse::checks::{
-    BackCoupled, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness, SeriesCompliance, Sizes,
-    rigid_motions_suffice,
+    BackCoupled, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness, SensorMasses,
+    SeriesCompliance, Sizes, rigid_motions_suffice,
 };
 use crate::hysteresis::compliance::ImaginaryPeak;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
 use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE,
-    SAME_IN_ALL, SERIES_COMPLIANCE, UNCHANGED,
+    SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, UNCHANGED,
 };
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
@@ -33,6 +33,7 @@ pub fn all(found: &Findings) -> Vec<Check> {
         checks.push(hidden_resonance(&contact.hidden));
         checks.push(hammer_slip(&contact.slip));
         checks.extend(contact.change.as_ref().map(contact_change));
+        checks.extend(contact.masses.as_ref().map(sensor_masses));
     }
     checks
 }
@@ -62,6 +63,39 @@ fn interface_modes(found: &Cmif) -> Check {
         check = check.with(&format!("explained_by_{count}"), *part);
     }
     check
+}
+
+/// What the masses of fixed sensors change.
+fn sensor_masses(found: &SensorMasses) -> Check {
+    let sums = format!(
+        "The fixed sensors add {} g to A's side and {} g to B's: the structure that was measured includes them. k_T does not depend on those on A, \
+         because the force at the contact is known from B's side.",
+        short(1e3 * found.on_a_kg),
+        short(1e3 * found.on_b_kg)
+    );
+    let names = found.in_one.join(", ");
+    let on_b = match found.change {
+        _ if found.in_one.is_empty() => {
+            "Those on B were measured on B alone and in the assembly: arm B has their inertia in both, and k_T does not depend on them either.".to_owned()
+        }
+        Some(change) => format!(
+            "{names} on B was measured on B alone or in the assembly, but not in both: if it was mounted only there, the force at the contact is up to \
+             {} % off, and k_T as much. Leave the sensors on B in place for both.",
+            short(100.0 * change)
+        ),
+        None => format!(
+            "{names} on B was measured on B alone or in the assembly, but not in both: what that changes is not known. Leave the sensors on B in place \
+             for both."
+        ),
+    };
+    let meaning = format!("{sums} {on_b}");
+    let check = Check::new(SENSOR_MASSES, found.ok(), meaning)
+        .with("on_a_kg", found.on_a_kg)
+        .with("on_b_kg", found.on_b_kg);
+    match found.change {
+        Some(change) => check.with("change_of_k_t", change),
+        None => check,
+    }
 }
 
 fn internals(found: &InternalsFound) -> Check {

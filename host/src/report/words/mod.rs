@@ -11,5 +11,7 @@ pub mod side_by_side;
 mod summary;
 pub(super) mod warning_sentences;
 
+#[cfg(feature = "sim")]
+pub use answer_sentences::expected;
 pub use names::{TURNED_DEG, excitation, method, outcome, shape_name, slope, static_arm};
 pub use summary::{bootstrapped, impact_loops, levels_at_the_contact, shaker_loops, substructuring, summary};

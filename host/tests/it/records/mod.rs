@@ -190,6 +190,7 @@ impl Measurements for Assembly {
                     specimen_b_m_per_s: self.signal(|l| spots[1][l], spot_floor, &mut stream),
                     tangential_n: self.signal(|l| tangential[l], cell_noise, &mut stream),
                 }),
+                load_cells: None,
             };
             look(&hit, RATE_HZ);
         }

@@ -27,7 +27,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::campaign::store::stored::Hex;
 use crate::campaign::watch::{Seen, Shaking, Watchers};
 use crate::device::channels::ChannelMap;
-use crate::device::samples::{ChannelView, Samples};
+use crate::device::samples::Samples;
 use crate::device::session::Session;
 use crate::hysteresis::record::in_step;
 use crate::hysteresis::{HysteresisRecord, RelativeMotion};
@@ -131,7 +131,7 @@ pub fn run_watched(
     if let Some(simulated) = session.simulated() {
         store.note_simulated(simulated)?;
     }
-    let (epoch, _) = session.start(channels.len())?;
+    let (epoch, _) = session.start(&channels)?;
     let simulated = is_simulated_board(&info.board);
     onlookers.watch.saw(&Seen::Stream { channels: &channels, simulated });
     if info.stage {
@@ -199,10 +199,7 @@ fn clipped(channels: &ChannelMap, samples: &Samples) -> Option<String> {
     let at_contact = |place: &usize| {
         matches!(channels.channels[*place].role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell)
     };
-    let full = |place: &usize| match samples.channel(*place) {
-        ChannelView::I16(codes) => codes.iter().any(|code| matches!(*code, i16::MIN | i16::MAX)),
-        _ => false,
-    };
+    let full = |place: &usize| samples.channel(*place).at_the_ends(channels.channels[*place].bits) > 0;
     (0..channels.len()).filter(at_contact).find(full).map(|place| channels.channels[place].name.to_string())
 }
 

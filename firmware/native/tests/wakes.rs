@@ -1,7 +1,7 @@
 //! No wake-up is lost, in any interleaving of the device's thread and the host's. Every
 //! interleaving is tried:
 //!
-//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-hil-sim --test it wakes
+//!     RUSTFLAGS="--cfg every_order" cargo test --release -p jointrig-native --test wakes
 //!     --target-dir target/loom
 //!
 //! Without that flag this file is empty.
@@ -15,8 +15,8 @@ use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 use jointrig_firmware::board::{ByteSink, ByteSource};
-use jointrig_hil_sim::executor::Woken;
-use jointrig_hil_sim::link::{DeviceEnd, pair};
+use jointrig_native::executor::Woken;
+use jointrig_native::link::{DeviceEnd, pair};
 use loom::thread;
 
 /// Polls as the board's thread does, until the future is ready or the link is closed.

@@ -75,7 +75,7 @@ pub fn pair() -> (HostEnd, DeviceEnd) {
 }
 
 fn gone() -> io::Error {
-    io::Error::new(io::ErrorKind::BrokenPipe, "the simulated device has stopped")
+    io::Error::new(io::ErrorKind::BrokenPipe, "the device has stopped")
 }
 
 impl HostEnd {
@@ -123,7 +123,7 @@ impl HostEnd {
                 return Err(gone());
             }
             if pipes.to_device.len() + bytes.len() > TO_DEVICE_BYTES {
-                return Err(io::Error::new(io::ErrorKind::WouldBlock, "the simulated device does not read"));
+                return Err(io::Error::new(io::ErrorKind::WouldBlock, "the device does not read"));
             }
             pipes.to_device.extend(bytes);
             pipes.reader.take()
@@ -181,6 +181,25 @@ impl DeviceEnd {
         while !woken.peek() && !pipes.closed {
             pipes = self.0.device.wait(pipes).unwrap_or_else(PoisonError::into_inner);
         }
+    }
+
+    /// Sleeps as [`DeviceEnd::sleep`] does, for `longest` at most.
+    pub fn sleep_for(&self, woken: &Woken, longest: Duration) {
+        let pipes = self.0.lock();
+        if !pipes.to_host.is_empty() {
+            self.0.host.notify_one();
+        }
+        if !woken.peek() && !pipes.closed {
+            // woken early for no reason, the caller comes again
+            drop(self.0.device.wait_timeout(pipes, longest).unwrap_or_else(PoisonError::into_inner));
+        }
+    }
+
+    /// Ends the device's sleep after another thread has woken one of its tasks.
+    pub fn nudge(&self) {
+        // the device checks its flag under this lock before it sleeps
+        drop(self.0.lock());
+        self.0.device.notify_one();
     }
 }
 

@@ -1,11 +1,12 @@
-//! Virtual time: embassy's time driver and two executors that the simulator advances.
+//! embassy's time driver and two executors, for devices that are threads of a PC program.
 //!
 //! embassy's time driver is one symbol of the whole program, so this one keeps its clock per
-//! thread: one simulated device is one thread, many devices are many threads, and their clocks are
-//! independent. Time does not advance while any task can run, and jumps to the next wake-up when
-//! none can; wake-ups at the same time happen in the order in which they were requested. An empty
-//! queue means that the device waits for something that cannot happen; this is reported as an
-//! error.
+//! thread: one device is one thread, many devices are many threads, and their clocks are
+//! independent. A simulated device's time is virtual: it does not advance while any task can run,
+//! and jumps to the next wake-up when none can ([`jump`]). An empty queue then means that the
+//! device waits for something that cannot happen; this is reported as an error. A device with real
+//! converters follows the computer's clock ([`advance_to`]). Wake-ups at the same time happen in
+//! the order in which they were requested.
 //!
 //! There are two ways of polling the same futures, because results must not depend on the order of
 //! polling: [`Polling::Join`] polls all of them in order, [`Polling::Tasks`] runs each as a task of
@@ -60,9 +61,9 @@ thread_local! {
     static ALARMS: RefCell<BinaryHeap<Reverse<Alarm>>> = const { RefCell::new(BinaryHeap::new()) };
 }
 
-struct VirtualTime;
+struct ThreadTime;
 
-impl embassy_time_driver::Driver for VirtualTime {
+impl embassy_time_driver::Driver for ThreadTime {
     fn now(&self) -> u64 {
         NOW_US.get()
     }
@@ -79,7 +80,7 @@ impl embassy_time_driver::Driver for VirtualTime {
     }
 }
 
-embassy_time_driver::time_driver_impl!(static DRIVER: VirtualTime = VirtualTime);
+embassy_time_driver::time_driver_impl!(static DRIVER: ThreadTime = ThreadTime);
 
 /// Jumps to the next wake-up of this thread's clock. `false` when there is none.
 pub fn jump() -> bool {
@@ -87,16 +88,33 @@ pub fn jump() -> bool {
         let Some(Reverse(next)) = alarms.pop() else { return false };
         NOW_US.set(NOW_US.get().max(next.at_us));
         next.waker.wake();
-        while alarms.peek().is_some_and(|Reverse(alarm)| alarm.at_us <= NOW_US.get()) {
-            if let Some(Reverse(alarm)) = alarms.pop() {
-                alarm.waker.wake();
-            }
-        }
+        wake_due(alarms);
         true
     })
 }
 
-/// This thread's virtual time, µs.
+/// Advances this thread's clock to `now_us`, and wakes what is due by then. The clock never goes
+/// back.
+pub fn advance_to(now_us: u64) {
+    NOW_US.set(NOW_US.get().max(now_us));
+    ALARMS.with_borrow_mut(wake_due);
+}
+
+/// Wakes everything whose time has come, in order.
+fn wake_due(alarms: &mut BinaryHeap<Reverse<Alarm>>) {
+    while alarms.peek().is_some_and(|Reverse(alarm)| alarm.at_us <= NOW_US.get()) {
+        if let Some(Reverse(alarm)) = alarms.pop() {
+            alarm.waker.wake();
+        }
+    }
+}
+
+/// Time of the next wake-up of this thread's clock, µs.
+pub fn next_alarm_us() -> Option<u64> {
+    ALARMS.with_borrow(|alarms| alarms.peek().map(|Reverse(alarm)| alarm.at_us))
+}
+
+/// This thread's time, µs.
 pub fn now_us() -> u64 {
     NOW_US.get()
 }

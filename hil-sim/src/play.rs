@@ -1,0 +1,266 @@
+//! Plays the rig as a recorder: its voltages as blocks of samples on standard output, in the format
+//! of docs/bridge.md. The host measures it with `--device "bridge:jointrig-hil-sim play …"`.
+//!
+//! The rig's operator strikes by hand and walks through a list of cells: in each, hammer and laser
+//! are put in place, the structure is at rest, and the given number of hits follow. Codes and cells
+//! are those of `sim:`; only the way to the host differs.
+
+use std::io::{ErrorKind, Write};
+use std::time::{Duration, Instant};
+
+use jointrig_protocol::answer::Info;
+use jointrig_protocol::channel::{Axis, Channel, Role};
+
+use crate::board::describe;
+use crate::rig::{Configuration, Rig, RigConfig, RigError};
+
+/// One cell of the operator's list.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Visit {
+    /// The configuration on the rig.
+    pub configuration: Configuration,
+    /// Impact point.
+    pub impact: String,
+    /// Response point.
+    pub response: String,
+}
+
+impl std::str::FromStr for Visit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let [configuration, impact, response] = text.split('/').collect::<Vec<_>>()[..] else {
+            return Err(format!("`{text}` is no cell: write e.g. AJB/AZ3/A3"));
+        };
+        let configuration = match configuration {
+            "A" => Configuration::A,
+            "B" => Configuration::B,
+            "AJB" => Configuration::Ajb,
+            other => return Err(format!("`{other}` is no configuration: write A, B or AJB")),
+        };
+        Ok(Self { configuration, impact: impact.into(), response: response.into() })
+    }
+}
+
+/// The type of the samples written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Samples {
+    /// The converters' codes.
+    I16,
+    /// Volts.
+    F32,
+}
+
+/// What is played, and how.
+#[derive(Clone, Debug)]
+pub struct Play {
+    /// Seed of noise, scatter and every position error.
+    pub seed: u64,
+    /// The cells, in order; after the last hit of the last one, the operator goes on there.
+    pub visits: Vec<Visit>,
+    /// Hits in each cell.
+    pub hits: u32,
+    /// Type of the samples.
+    pub samples: Samples,
+    /// Scans of a block.
+    pub block: usize,
+    /// Blocks come at the times at which a recorder delivers them, and do not wait; otherwise the
+    /// source can be held.
+    pub paced: bool,
+}
+
+/// Why the rig cannot be played.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayError {
+    /// The rig's description, or a cell's name.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// Nobody strikes.
+    #[error("nobody strikes this rig: its description needs [hammer.hand] with every_s and pulse_s")]
+    NoHand,
+    /// Nobody reads the samples, or they cannot be written.
+    #[error("the samples could not be written: {0}")]
+    Write(#[from] std::io::Error),
+}
+
+/// Plays until nobody reads any more.
+///
+/// # Errors
+/// [`PlayError`].
+pub fn play(config: &RigConfig, play: &Play, mut to: impl Write) -> Result<(), PlayError> {
+    let every_s = config.hammer.hand.ok_or(PlayError::NoHand)?.every_s;
+    let mut rig = Rig::new(config, play.seed)?;
+    let channels = describe(rig.channels());
+    let rate_hz = f64::from(rig.scan_rate_hz());
+    // until shortly before the next hit would follow, so that a long record of the last one is whole
+    let stay = ((f64::from(play.hits) + 0.9) * every_s * rate_hz) as u64;
+    let mut blocks = Blocks { play, rate_hz, scans: 0, begun: Instant::now(), bytes: Vec::new() };
+    let outcome = (|| {
+        to.write_all(header(play, rate_hz, channels).as_bytes())?;
+        for visit in &play.visits {
+            rig.stage(visit.configuration, &visit.impact, &visit.response, 0)?;
+            let until = blocks.scans + stay;
+            while blocks.scans < until {
+                let scans = (until - blocks.scans).min(play.block as u64) as usize;
+                blocks.write(&mut rig, channels, scans, &mut to)?;
+            }
+        }
+        loop {
+            blocks.write(&mut rig, channels, play.block, &mut to)?;
+        }
+    })();
+    match outcome {
+        // whoever reads has what it wanted
+        Err(PlayError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
+}
+
+/// The first line.
+fn header(play: &Play, rate_hz: f64, channels: &[Channel]) -> String {
+    let sample = match play.samples {
+        Samples::I16 => "i16",
+        Samples::F32 => "f32",
+    };
+    let described: Vec<String> = channels
+        .iter()
+        .map(|channel| {
+            // one over the factor is exact to the last digit of single precision
+            let sensitivity_v = 1.0 / f64::from(channel.units_per_volt);
+            format!(
+                r#"{{"name":"{}","role":"{}","unit":"{}","sensitivity_v":{sensitivity_v:?},"full_scale":{},"delay_s":{:?}}}"#,
+                channel.name,
+                word(channel.role),
+                channel.quantity.unit(),
+                channel.range_v,
+                f64::from(channel.delay_ns) * 1e-9
+            )
+        })
+        .collect();
+    format!(
+        "{{\"jointrig_bridge\":1,\"board\":\"{}\",\"serial\":\"play-{:016x}\",\"rate_hz\":{rate_hz},\"sample\":\"{sample}\",\
+         \"held\":{},\"channels\":[{}]}}\n",
+        Info::VIRTUAL_BOARD,
+        play.seed,
+        !play.paced,
+        described.join(",")
+    )
+}
+
+/// A role in the words of the format.
+fn word(role: Role) -> &'static str {
+    match role {
+        Role::HammerForce => "hammer_force",
+        Role::Response(Axis::X) => "response_x",
+        Role::Response(Axis::Y) => "response_y",
+        Role::Response(Axis::Z) => "response_z",
+        Role::SpecimenA => "specimen_a",
+        Role::SpecimenB => "specimen_b",
+        Role::LoadCell => "load_cell",
+        Role::Excitation => "excitation",
+        Role::Auxiliary => "auxiliary",
+    }
+}
+
+/// The blocks written so far.
+struct Blocks<'a> {
+    play: &'a Play,
+    rate_hz: f64,
+    scans: u64,
+    begun: Instant,
+    bytes: Vec<u8>,
+}
+
+impl Blocks<'_> {
+    /// Advances the rig by `scans` and writes them as one block.
+    fn write(
+        &mut self,
+        rig: &mut Rig,
+        channels: &[Channel],
+        scans: usize,
+        to: &mut impl Write,
+    ) -> Result<(), PlayError> {
+        self.bytes.clear();
+        self.bytes.extend(b"JRBK");
+        self.bytes.extend((scans as u32).to_le_bytes());
+        // nothing lost before it, no flags
+        self.bytes.extend([0; 16]);
+        let mut codes = vec![0; channels.len()];
+        for _ in 0..scans {
+            rig.scan(&mut codes);
+            for (code, channel) in codes.iter().zip(channels) {
+                match self.play.samples {
+                    Samples::I16 => self.bytes.extend(code.to_le_bytes()),
+                    Samples::F32 => {
+                        let volts = f32::from(*code) * channel.range_v / 32_768.0;
+                        self.bytes.extend(volts.to_le_bytes());
+                    }
+                }
+            }
+        }
+        self.scans += scans as u64;
+        if self.play.paced {
+            let due = Duration::from_secs_f64(self.scans as f64 / self.rate_hz);
+            std::thread::sleep(due.saturating_sub(self.begun.elapsed()));
+        }
+        to.write_all(&self.bytes)?;
+        Ok(to.flush()?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BY_HAND: &str = include_str!("../rigs/by-hand.toml");
+
+    /// Takes so many bytes, then nobody reads.
+    struct Reader(Vec<u8>, usize);
+
+    impl Write for Reader {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            if self.0.len() + bytes.len() > self.1 {
+                return Err(ErrorKind::BrokenPipe.into());
+            }
+            self.0.extend(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn played(samples: Samples) -> (String, Vec<u8>) {
+        let config = RigConfig::from_toml(BY_HAND).expect("good");
+        let visits = vec!["AJB/AZ3/A3".parse().expect("a cell")];
+        let options = Play { seed: 7, visits, hits: 1, samples, block: 100, paced: false };
+        let mut reader = Reader(Vec::new(), 30_000);
+        play(&config, &options, &mut reader).expect("until nobody reads");
+        let end = reader.0.iter().position(|byte| *byte == b'\n').expect("a line");
+        (String::from_utf8(reader.0[..end].to_vec()).expect("text"), reader.0[end + 1..].to_vec())
+    }
+
+    #[test]
+    fn the_codes_are_the_rigs_and_the_volts_are_the_codes() {
+        let (header, codes) = played(Samples::I16);
+        assert!(header.contains(r#"{"name":"vib_z","role":"response_z","unit":"m/s""#), "{header}");
+        let mut rig = Rig::new(&RigConfig::from_toml(BY_HAND).expect("good"), 7).expect("good");
+        rig.stage(Configuration::Ajb, "AZ3", "A3", 0).expect("known");
+        assert_eq!(&codes[..8], b"JRBK\x64\0\0\0");
+        assert_eq!(codes[8..24], [0; 16]);
+        let mut wanted = [0; 16];
+        for scan in codes[24..24 + 3200].chunks_exact(32) {
+            rig.scan(&mut wanted);
+            let got: Vec<i16> =
+                scan.chunks_exact(2).map(|code| i16::from_le_bytes([code[0], code[1]])).collect();
+            assert_eq!(got, wanted);
+        }
+        let (_, volts) = played(Samples::F32);
+        for (code, volt) in codes[24..3224].chunks_exact(2).zip(volts[24..6424].chunks_exact(4)) {
+            let code = f64::from(i16::from_le_bytes([code[0], code[1]]));
+            let volt = f64::from(f32::from_le_bytes([volt[0], volt[1], volt[2], volt[3]]));
+            assert_eq!(code * 10.0 / 32_768.0, volt);
+        }
+    }
+}

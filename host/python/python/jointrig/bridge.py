@@ -1,0 +1,285 @@
+"""A recorder as a device of jointrig: a program that writes its samples.
+
+    # jointrig campaign run lab.jrig --device "bridge:python my_daq.py"
+    from jointrig import bridge
+    channels = [bridge.Channel("force", "N", full_scale=5, sensitivity_v=0.00225, role="hammer_force"),
+                bridge.Channel("acc_z", "m/s^2", full_scale=5, sensitivity_v=0.0102)]
+    with bridge.Source("NI cDAQ", serial="1A2B3C", rate_hz=25_600, channels=channels) as out:
+        task.start()
+        while out.wanted():
+            out.write(np.array(task.read(1280)).T)        # (n, channels)
+
+Import this module first. While the program runs under `jointrig`, the import takes standard output for the samples, and
+whatever the program prints goes to standard error: jointrig logs it, and shows the last line where the program ends.
+This module is pure Python and opens no device itself. The format is described in docs/bridge.md.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+__all__ = ["Channel", "Source", "from_callable", "from_ldaq", "from_nidaqmx", "from_opendaq", "from_sounddevice"]
+
+_TYPES = {"i16": np.dtype("<i2"), "i32": np.dtype("<i4"), "f32": np.dtype("<f4"), "f64": np.dtype("<f8")}
+_OVERRUN = 1
+# set by the host for the programs that it starts
+_UNDER_THE_HOST = "JOINTRIG_BRIDGE"
+_claimed: int | None = None
+
+
+def _claim_stdout() -> int:
+    """The file descriptor of the samples: the former standard output. File descriptor 1 becomes standard error, so that
+    neither `print` nor a library written in C puts text between the samples."""
+    global _claimed
+    if _claimed is None:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        _claimed = os.dup(1)
+        os.dup2(2, 1)
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.setmode(_claimed, os.O_BINARY)
+    return _claimed
+
+
+if os.environ.get(_UNDER_THE_HOST):
+    _claim_stdout()
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of the recorder.
+
+    unit: N, kN, lbf, m/s, mm/s, m, mm, um, m/s^2, g, V or mV. With sensitivity_v (V per unit; negative for a reversed
+    sensor), samples and full_scale are in V, otherwise in the unit. role: hammer_force, response_x, response_y,
+    response_z, specimen_a, specimen_b, load_cell, excitation or auxiliary. delay_s: how late the samples are.
+    """
+
+    name: str
+    unit: str
+    full_scale: float
+    sensitivity_v: float | None = None
+    role: str = "auxiliary"
+    delay_s: float = 0.0
+
+
+class Source:
+    """Writes a recorder's samples to jointrig.
+
+    serial must be the same in every run: a campaign is continued only with the recorder that it was begun with.
+    sample: type of the samples, i16, i32 (with the bits of its full scale), f32 or f64. held: the source can wait, as a
+    file or a simulation; a recorder cannot. listen: "HOST:PORT", to wait there for a jointrig on another computer
+    (`--device bridge:tcp:HOST:PORT`) instead of being started by it.
+    """
+
+    def __init__(
+        self,
+        board: str,
+        *,
+        serial: str,
+        rate_hz: float,
+        channels: Sequence[Channel],
+        sample: str = "f32",
+        bits: int | None = None,
+        held: bool = False,
+        listen: str | None = None,
+    ) -> None:
+        self._type = _TYPES[sample]
+        self._channels = len(channels)
+        self._lost, self._flags = 0, 0
+        self._gone = threading.Event()
+        header: dict[str, Any] = {"jointrig_bridge": 1, "board": board, "serial": serial, "rate_hz": rate_hz}
+        header |= {"sample": sample, "held": held} | ({} if bits is None else {"bits": bits})
+        header["channels"] = [{k: v for k, v in asdict(own).items() if v is not None} for own in channels]
+        self._socket = _accept(listen) if listen else None
+        self._file = -1 if self._socket else _claim_stdout()
+        if self._socket is None and os.environ.get(_UNDER_THE_HOST):
+            # the host keeps standard input open as long as it wants samples
+            threading.Thread(target=self._watch_stdin, daemon=True).start()
+        self._send(json.dumps(header, allow_nan=False).encode() + b"\n")
+
+    def __enter__(self) -> Source:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Writes nothing more."""
+        self._gone.set()
+        if self._socket is not None:
+            self._socket.close()
+
+    def wanted(self) -> bool:
+        """Whether jointrig still reads: False once it has ended or the connection is closed."""
+        return not self._gone.is_set()
+
+    def write(self, samples: ArrayLike) -> None:
+        """Writes scans: an array (n, channels) in V, or in the channels' units, or codes of i16 or i32.
+
+        A sample that is not a number makes its scan count as lost.
+        """
+        array = np.asarray(samples)
+        if array.ndim != 2 or array.shape[1] != self._channels:
+            raise ValueError(f"samples have the shape {array.shape}: (n, {self._channels}) is needed, one scan per row")
+        if not np.can_cast(array.dtype, self._type, "same_kind"):
+            raise TypeError(f"samples are {array.dtype}, the source has {self._type}: they would be rounded")
+        self._block(array.shape[0], np.ascontiguousarray(array, dtype=self._type).tobytes())
+
+    def lost(self, scans: int) -> None:
+        """So many scans were lost before the next ones."""
+        self._lost += int(scans)
+
+    def overrun(self) -> None:
+        """An unknown number of scans was lost before the next ones; jointrig estimates it from the clock."""
+        self._flags |= _OVERRUN
+
+    def _block(self, scans: int, data: bytes) -> None:
+        head = struct.pack("<4sIQII", b"JRBK", scans, self._lost, self._flags, 0)
+        self._lost, self._flags = 0, 0
+        self._send(head + data)
+
+    def _send(self, data: bytes) -> None:
+        if self._gone.is_set():
+            return
+        try:
+            if self._socket is not None:
+                self._socket.sendall(data)
+            else:
+                rest = memoryview(data)
+                while rest:
+                    rest = rest[os.write(self._file, rest) :]
+        except (BrokenPipeError, ConnectionError, OSError) as error:
+            if not isinstance(error, (BrokenPipeError, ConnectionError)) and error.errno != 22:  # EINVAL: Windows' pipe
+                raise
+            self._gone.set()
+
+    def _watch_stdin(self) -> None:
+        while os.read(0, 4096):
+            pass
+        self._gone.set()
+
+
+def _accept(listen: str) -> socket.socket:
+    host, _, port = listen.rpartition(":")
+    with socket.create_server((host, int(port))) as server:
+        print(f"waiting for jointrig at {host}:{server.getsockname()[1]}", file=sys.stderr, flush=True)
+        peer, _ = server.accept()
+    return peer
+
+
+def from_callable(read: Callable[[], ArrayLike | None], board: str, **source: Any) -> None:
+    """Writes what `read()` returns, (n, channels) each time, until it returns None. source: the arguments of Source."""
+    with Source(board, **source) as out:
+        while out.wanted() and (samples := read()) is not None:
+            out.write(samples)
+
+
+def from_ldaq(acq: Any, channels: Sequence[Channel], *, serial: str, **source: Any) -> None:
+    """Writes what an acquisition of LDAQ reads: NI, Dewesoft, Digilent, serial ports, a simulation.
+
+    The channels stand in the order of acq.channel_names; name the same ones.
+    """
+    acq.set_data_source()
+    # virtual channels follow the source's own, and are not read here
+    names = list(acq.channel_names)[: len(channels)]
+    if [own.name for own in channels] != names:
+        raise ValueError(f"the acquisition's channels are {names}: describe these, in this order")
+    try:
+        rate_hz = float(acq.get_sample_rate())
+        with Source(acq.acquisition_name, serial=serial, rate_hz=rate_hz, channels=channels, **source) as out:
+            while out.wanted():
+                samples = acq.read_data()
+                if len(samples):
+                    out.write(np.asarray(samples, dtype=float))
+                else:
+                    time.sleep(0.01)
+    finally:
+        acq.terminate_data_source()
+
+
+def from_opendaq(
+    signals: Sequence[Any], channels: Sequence[Channel] | None = None, *, board: str, serial: str, **source: Any
+) -> None:
+    """Writes signals of openDAQ (Dewesoft, HBK) that share one clock.
+
+    Without channels, name, unit and range come from the signals' descriptors; full scale is the range.
+    """
+    import opendaq
+
+    if channels is None:
+        channels = [_described(own) for own in signals]
+    reader = opendaq.MultiReader(list(signals), value_type=opendaq.SampleType.Float64)
+    # the first read returns the descriptors only, and with them the common rate
+    block, rate_hz = np.empty((len(signals), 0)), 0.0
+    for _ in range(100):
+        block = np.atleast_2d(reader.read(1, 100))
+        rate_hz = float(reader.common_sample_rate)
+        if block.size:
+            break
+    with Source(board, serial=serial, rate_hz=rate_hz, channels=channels, sample="f64", **source) as out:
+        out.write(block.reshape(len(signals), -1).T)
+        most = max(1, int(rate_hz / 20))
+        while out.wanted():
+            block, status = reader.read(most, 200, return_status=True)
+            if not status.valid:
+                raise RuntimeError("openDAQ's signals changed or can no longer be aligned: start the measurement again")
+            out.write(np.asarray(block).reshape(len(signals), -1).T)
+
+
+def _described(signal: Any) -> Channel:
+    descriptor = signal.descriptor
+    high = descriptor.value_range.high_value if descriptor.value_range else None
+    if high is None or descriptor.unit is None:
+        raise ValueError(f"signal {signal.name} states no range or no unit: describe the channels yourself")
+    return Channel(signal.name, descriptor.unit.symbol, full_scale=float(high))
+
+
+def from_sounddevice(channels: Sequence[Channel], *, device: Any = None, rate_hz: float = 48_000, **source: Any) -> None:
+    """Writes the inputs of a sound card. Samples are parts of full scale: give full_scale in V as measured with a known
+    voltage (a sound card states none)."""
+    import sounddevice
+
+    scale = np.array([own.full_scale for own in channels])
+    board = str(sounddevice.query_devices(device, "input")["name"])[:24].strip()
+    source.setdefault("serial", board)
+    with (
+        Source(board, rate_hz=rate_hz, channels=channels, **source) as out,
+        sounddevice.InputStream(
+            samplerate=rate_hz, device=device, channels=len(channels), dtype="float32", latency="high"
+        ) as stream,
+    ):
+        while out.wanted():
+            samples, overflowed = stream.read(int(rate_hz / 20))
+            if overflowed:
+                out.overrun()
+            out.write(samples * scale.astype(np.float32))
+
+
+def from_nidaqmx(task: Any, channels: Sequence[Channel], *, board: str, serial: str, **source: Any) -> None:
+    """Writes a task of NI-DAQmx with continuous sampling; its channels in the order of `channels`.
+
+    Channels of voltage give V: state sensitivity_v. Channels with a unit (IEPE accelerometer, force) give that unit.
+    """
+    rate_hz = float(task.timing.samp_clk_rate)
+    most = int(rate_hz / 20)
+    # ten seconds: the driver reports an overrun as an error and stops
+    task.in_stream.input_buf_size = int(10 * rate_hz)
+    task.start()
+    with Source(board, serial=serial, rate_hz=rate_hz, channels=channels, sample="f64", **source) as out:
+        while out.wanted():
+            out.write(np.asarray(task.read(most, timeout=10.0)).reshape(len(channels), -1).T)
+    task.stop()
