@@ -83,6 +83,9 @@ impl ScanLayout {
 
     /// `scans` samples of each channel, of which those from `at` on are in `words` (whole scans,
     /// one after another) and the others are 0.
+    ///
+    /// # Panics
+    /// Never: all channels get the same number of samples.
     pub fn samples(&self, scans: usize, at: usize, words: &[i16]) -> Samples {
         let mut lower = self.bits.len()..;
         let mut of = |(place, bits): (usize, &u8)| {

@@ -4,9 +4,11 @@
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::store::Store;
 use jointrig::exchange::{read_frf, read_impacts, write_impacts};
+use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{campaign, done};
 use serde_json::Value;
+use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
@@ -139,4 +141,86 @@ fn nothing_is_overwritten_unasked_and_nothing_stored_of_files_without_a_name() {
     assert_eq!(of_cell("A1"), 6);
     let missing = refused(import(&cell, &file, &names));
     assert!(missing.contains("there is no file"), "{missing}");
+}
+
+/// Writes every kept hit as a recorder without jointrig would: one text file for each, with the
+/// hammer in volts and velocities in mm/s; returns the sums of squares of all signals, SI.
+fn as_text(measured: &Path, folder: &Path) -> Vec<f64> {
+    std::fs::create_dir(folder).unwrap();
+    let store = Store::open_read_only(measured).unwrap();
+    let cells = store.cells().unwrap();
+    let mut sums = Vec::new();
+    for row in store.records().unwrap().into_iter().flatten().filter(|row| row.kept()) {
+        let (map, samples) = (store.channels(row.session).unwrap(), store.samples(&row).unwrap());
+        let cell = &cells.iter().find(|cell| cell.id == row.cell).unwrap().cell;
+        let mut text = "time (s)".to_owned();
+        let mut signals = Vec::new();
+        for (place, channel) in map.channels.iter().enumerate() {
+            let si = map.to_si(place, samples.channel(place));
+            sums.push(si.iter().map(|value| value * value).sum());
+            let (name, factor) = match (channel.role, channel.quantity) {
+                (Role::HammerForce, _) => ("ai0 (V)".to_owned(), 2.25e-3),
+                (_, Quantity::Velocity) => (format!("{} (mm/s)", channel.name), 1e3),
+                _ => (format!("{} (N)", channel.name), 1.0),
+            };
+            write!(text, ",{name}").unwrap();
+            signals.push(si.into_iter().map(|value| value * factor).collect::<Vec<f64>>());
+        }
+        // a tenth of the length is enough
+        for scan in 0..row.scans.min(12_000) {
+            write!(text, "\n{}", scan as f64 / map.fs_hz()).unwrap();
+            signals.iter().for_each(|signal| write!(text, ",{}", signal[scan]).unwrap());
+        }
+        let configuration = jointrig::campaign::plan::configuration_name(cell.configuration);
+        let name = format!("{configuration}-{}-{} no {}.csv", cell.impact, cell.response, row.id);
+        std::fs::write(folder.join(name), text).unwrap();
+    }
+    sums
+}
+
+#[test]
+fn files_of_a_recorder_with_all_channels_are_imported_with_their_sensitivities() {
+    let (folder, measured) = campaign(SMALL);
+    done(jointrig().args(["campaign", "run", "--yes", "--device", "sim:"]).arg(&measured));
+    let text = folder.path().join("text");
+    let sums = as_text(&measured, &text);
+    let (_new, file) = campaign(SMALL);
+    let pattern = ["--pattern", "{configuration}-{impact}-{response} no {hit}"];
+    let said = refused(import(&text, &file, &pattern));
+    assert!(said.contains("ai0") && said.contains("--calibrate 'ai0=NAME:SENSITIVITY'"), "{said}");
+    let calibrate = [&pattern[..], &["--calibrate", "ai0=hammer:2.25 mV/N"]].concat();
+    let told = done(&mut import(&text, &file, &calibrate));
+    assert!(told.contains("hits in 7 cells"), "{told}");
+    assert_eq!(kept(&file), kept(&measured));
+    let store = Store::open_read_only(&file).unwrap();
+    let mut found = Vec::new();
+    for row in store.records().unwrap().into_iter().flatten() {
+        let (map, samples) = (store.channels(row.session).unwrap(), store.samples(&row).unwrap());
+        assert!(map.place(Role::SpecimenA).is_some() && map.place(Role::LoadCell).is_some());
+        found.extend((0..map.len()).map(|place| {
+            map.to_si(place, samples.channel(place)).iter().map(|value| value * value).sum::<f64>()
+        }));
+    }
+    assert_eq!(found.len(), sums.len());
+    // the beginning of each record has less than all of it, and nearly all of the hammer's
+    let hammer = |all: &[f64]| all.iter().step_by(sums.len() / store.places().unwrap().len()).sum::<f64>();
+    assert!((hammer(&found) / hammer(&sums) - 1.0).abs() < 1e-2, "{} {}", hammer(&found), hammer(&sums));
+    // again: nothing is stored twice
+    assert!(done(&mut import(&text, &file, &calibrate)).contains("were there already"));
+
+    let path = std::fs::read_dir(&text).unwrap().next().unwrap().unwrap().path();
+    let content = std::fs::read_to_string(&path).unwrap();
+    let (_other, fresh) = campaign(SMALL);
+    for (change, wanted) in [
+        (content.replacen("ldv_a (mm/s)", "ldv_a", 1), "has no unit"),
+        (content.replacen("ldv_a (mm/s)", "laser 2 (mm/s)", 1), "'laser 2=-' to leave it out"),
+        (content.replacen("time (s)", "when", 1), "no column is called `time (s)`"),
+    ] {
+        let one = folder.path().join("one");
+        std::fs::create_dir_all(&one).unwrap();
+        std::fs::write(one.join(path.file_name().unwrap()), change).unwrap();
+        let said = refused(import(&one, &fresh, &calibrate));
+        assert!(said.contains(wanted), "{said}");
+    }
+    assert_eq!(records(&fresh), 0);
 }

@@ -194,7 +194,7 @@ impl LastRead {
     ) -> Result<&Signals, RestoreError> {
         if self.name != name {
             self.signals = read_exported(&folder.join(name), holding, bytes())?;
-            self.name = name.to_owned();
+            name.clone_into(&mut self.name);
         }
         Ok(&self.signals)
     }
@@ -379,18 +379,17 @@ impl Archive<'_> {
                 continue;
             }
             let from = self.session(own.row.session)?;
-            let samples = match &own.samples {
-                Some(place) => self.samples(&own.row, from, place, &mut hits, &mut others)?,
-                None => {
-                    restored.without_samples += usize::from(own.row.scans > 0);
-                    self.without_samples(&own.row)?
-                }
+            let samples = if let Some(place) = &own.samples {
+                self.samples(&own.row, from, place, &mut hits, &mut others)?
+            } else {
+                restored.without_samples += usize::from(own.row.scans > 0);
+                self.without_samples(&own.row)?
             };
             let mut attempt = own.row.attempt;
             while !attempts.insert((cell, attempt)) {
                 attempt += 1;
             }
-            let row = RecordRow { cell, session, attempt, ..own.row.clone() };
+            let row = RecordRow { cell, attempt, session, ..own.row.clone() };
             ids.insert(own.row.id, store.copy_record(&row, samples, &from.link.clone().unwrap_or_default())?);
         }
         at(document.records.len(), document.records.len());
@@ -473,7 +472,7 @@ impl Archive<'_> {
         scans: usize,
     ) -> Result<Samples, String> {
         let map = self.exported_channels(session);
-        let one = |((signal, of), channel): ((&Option<&Vec<f64>>, &SampleType), &Channel)| {
+        let one = |((signal, of), channel): ((Option<&Vec<f64>>, &SampleType), &Channel)| {
             let name = &channel.name;
             let si = signal.ok_or_else(|| format!("channel {name} is missing"))?;
             if si.len() != scans {
@@ -483,7 +482,8 @@ impl Archive<'_> {
                 format!("channel {name}, sample {sample} is no value of its type ({})", of.name())
             })
         };
-        let all = signals.iter().zip(types).zip(&map.channels).map(one).collect::<Result<Vec<_>, _>>()?;
+        let all =
+            signals.iter().copied().zip(types).zip(&map.channels).map(one).collect::<Result<Vec<_>, _>>()?;
         Samples::new(all).ok_or_else(|| "its channels differ in length".into())
     }
 

@@ -3,7 +3,7 @@
 
 use std::str::FromStr;
 
-use jointrig_protocol::channel::{Channel, Quantity};
+use jointrig_protocol::channel::{Channel, Quantity, Role};
 
 use super::channel_file::{ChannelFile, FULL_SCALE, FileChannel};
 use super::roles::{role_of, same_name};
@@ -126,6 +126,17 @@ fn sensitivity(text: &str) -> Result<StatedScale, String> {
     Ok(StatedScale { per_volt: value * factor / volts, quantity })
 }
 
+/// Whether a file names channels other than the force and the responses of a location: specimens,
+/// load cells, the shaker's force.
+pub fn names_the_contact(plan: &Plan, file: &ChannelFile) -> bool {
+    let of_contact = |channel: &FileChannel| {
+        let role = |quantity| role_of(plan, "", &channel.name, quantity);
+        matches!(role(Quantity::Force), Some(Role::LoadCell | Role::Excitation))
+            || matches!(role(Quantity::Velocity), Some(Role::SpecimenA | Role::SpecimenB))
+    };
+    file.channels.iter().any(of_contact)
+}
+
 /// A channel that is kept: its place in the file, its description, and the factor of its values.
 struct Kept {
     place: usize,
@@ -145,7 +156,7 @@ struct Kept {
 pub fn assigned(
     plan: &Plan,
     response: &str,
-    file: ChannelFile,
+    file: &ChannelFile,
     stated: &Calibrations,
 ) -> Result<(ChannelMap, Vec<Samples>), String> {
     for own in &stated.0 {
@@ -208,6 +219,10 @@ fn described(
         Some(Stated { name: Some(name), .. }) => name,
         None => in_file,
     };
+    // records find the channels of fixed sensors by the plan's spelling
+    let mut fixed =
+        plan.geometry.response.iter().filter_map(|point| point.get_ref().channels.as_ref()).flatten();
+    let name = fixed.find(|own| same_name(own, name)).unwrap_or(name);
     let remedy = format!(
         "state its sensor with --calibrate '{in_file}=NAME:SENSITIVITY', e.g. '{in_file}=hammer:2.25 mV/N'"
     );
@@ -295,7 +310,6 @@ fn from_plan(name: &str, planned: Option<&SensorPlan>) -> Option<(Quantity, f64,
 mod tests {
     use super::*;
     use crate::campaign::plan::CONTACT;
-    use jointrig_protocol::channel::Role;
 
     fn file(channels: &[(&str, Option<&str>)]) -> ChannelFile {
         let describe = |(name, unit): &(&str, Option<&str>)| FileChannel {
@@ -335,7 +349,7 @@ mod tests {
     fn channels_get_roles_and_scales_or_the_remedy_is_named() {
         let plan = Plan::parse(CONTACT, "contact.toml").expect("a plan");
         let assign = |channels: &[(&str, Option<&str>)], stated: &str| {
-            assigned(&plan, "S1", file(channels), &stated.parse().expect("stated"))
+            assigned(&plan, "S1", &file(channels), &stated.parse().expect("stated"))
         };
         let usual =
             [("hammer", Some("N")), ("LDV_A", Some("mm/s")), ("ai7", Some("V")), ("spare", Some("V"))];

@@ -269,7 +269,9 @@ fn of_uff(path: &Path) -> Result<ChannelFile, ChannelFileError> {
         }
         if let Some(hit) = hits.last_mut() {
             hit.resize(hit.len().max(place + 1), None);
-            hit[place] = Some(own.clone());
+            // a hammer pushes whichever way its label points
+            let turned = function.response.direction < 0 && function.response != function.reference;
+            hit[place] = Some(if turned { own.iter().map(|value| -value).collect() } else { own.clone() });
         }
     }
     let step = step.ok_or_else(|| wrong(path, "it holds no time response"))?;
@@ -331,7 +333,7 @@ fn unit_of(function: &Function) -> Option<String> {
 }
 
 /// Columns under a heading `NAME (UNIT)`: a column of time, one of each channel, and possibly one
-/// with the number of the hit.
+/// with the number of the hit; or what jointrig exports.
 fn of_text(path: &Path) -> Result<ChannelFile, ChannelFileError> {
     let opened = untrusted_input::text(path, MOST);
     let text = opened.map_err(|source| ChannelFileError::Open { path: path.into(), source })?;
@@ -365,7 +367,7 @@ fn of_text(path: &Path) -> Result<ChannelFile, ChannelFileError> {
         let row = row.map_err(failed)?;
         let own = number.map_or("", |column| &row[column]);
         if all.is_empty() || own != last {
-            last = own.to_owned();
+            own.clone_into(&mut last);
             all.push(vec![Vec::new(); kept.len()]);
             times.push(Vec::new());
         }

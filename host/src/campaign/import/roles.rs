@@ -39,6 +39,9 @@ pub fn role_of(plan: &Plan, response: &str, name: &str, quantity: Quantity) -> O
     let of_location = own.strip_prefix(location.as_str());
     let bare = of_location.filter(|rest| !rest.is_empty()).unwrap_or(&own);
     let axis = ["vib", "ldv", "response"].iter().find_map(|word| bare.strip_prefix(word)).unwrap_or(bare);
+    // `A1:1` is the first axis of `A1`, but `A11` is another place
+    let apart = name.contains(|c: char| !c.is_alphanumeric());
+    let number = of_location.filter(|rest| !location.is_empty() && (rest.is_empty() || apart));
     let numbered =
         |prefix: &str| own.strip_prefix(prefix).is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()));
     match (quantity, own.as_str()) {
@@ -48,7 +51,7 @@ pub fn role_of(plan: &Plan, response: &str, name: &str, quantity: Quantity) -> O
         (_, "ldva" | "specimena" | "velocitya") if motion => Some(Role::SpecimenA),
         (_, "ldvb" | "specimenb" | "velocityb") if motion => Some(Role::SpecimenB),
         // a location with axes of its own numbers them, and one with a single axis has its name
-        _ if motion => match (axis, of_location) {
+        _ if motion => match (axis, number) {
             ("x", _) | (_, Some("" | "1")) => Some(Role::Response(Axis::X)),
             ("y", _) | (_, Some("2")) => Some(Role::Response(Axis::Y)),
             ("z", _) | (_, Some("3")) => Some(Role::Response(Axis::Z)),
@@ -74,6 +77,8 @@ mod tests {
         assert_eq!(role("vib_x", velocity), Some(Role::Response(Axis::X)));
         assert_eq!(role("S1:2", velocity), Some(Role::Response(Axis::Y)));
         assert_eq!(role("s1", velocity), Some(Role::Response(Axis::X)));
+        assert_eq!(role("S11", velocity), None);
+        assert_eq!(role_of(&plan, "", "1", velocity), None);
         assert_eq!(role("LDV_A", velocity), Some(Role::SpecimenA));
         assert_eq!(role("ldv b", velocity), Some(Role::SpecimenB));
         assert_eq!(role("lc_3", force), Some(Role::LoadCell));

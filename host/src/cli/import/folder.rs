@@ -3,10 +3,11 @@
 
 use std::path::Path;
 
-use super::names::{Named, NamedFile, from_folder, from_table};
-use super::records::{Brought, bring, length_notice, origin_of};
+use super::names::{Named, NamedFile, Pattern, from_folder, from_table};
+use super::records::{Brought, bring, bring_channels, has_all_channels, length_notice, origin_of};
 use super::{Frfs, bad, frfs};
 use crate::campaign::import::CellName;
+use crate::campaign::import::assign::Calibrations;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::store::Store;
 use crate::campaign::verdict::{Judgement, Verdict};
@@ -21,6 +22,9 @@ use crate::untrusted_text::tell_line;
 pub(super) struct Wishes<'w> {
     pub(super) configuration: Option<&'w str>,
     pub(super) names: Option<&'w Path>,
+    /// Form of the files' names.
+    pub(super) pattern: Option<&'w Pattern>,
+    pub(super) calibrate: &'w Calibrations,
     pub(super) replace: bool,
     pub(super) units: &'w StatedUnits,
 }
@@ -57,10 +61,13 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
     let plan = store.plan()?;
     let (sources, left_out) = match wishes.names {
         Some(table) => (from_table(folder, table)?, Vec::new()),
-        None => from_folder(folder, &plan, wishes.configuration)?,
+        None => from_folder(folder, &plan, wishes.configuration, wishes.pattern)?,
     };
     for path in &left_out {
-        tell_line!("{}: left out, it is neither .npz nor a universal file", path.display());
+        tell_line!(
+            "{}: left out, it is no .npz and no universal file, nor .csv or .wav with the name of a cell",
+            path.display()
+        );
     }
     let waiting = Waiting::of("importing files");
     let (mut all, mut matrices, mut taken) = (Brought::default(), 0, Taken::default());
@@ -91,7 +98,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
             "{}: {} hits in {} cells, {} of them good{there}",
             into.display(),
             all.hits,
-            all.cells,
+            all.cells.len(),
             all.kept
         ));
         lines.extend(length);
@@ -134,13 +141,16 @@ fn one(
             Ok(None)
         }
         Named::Cell { configuration, impact, response } => {
-            let read = read_record_file(path, units).map_err(bad)?;
-            say(path, &read.notes);
             let origin = origin_of(path, name)?;
             let cell = CellName { configuration, impact, response };
-            let brought = bring(store, &origin, &cell, read, replace, &mut |hit, verdict| {
-                say_refused(name, hit, verdict);
-            })?;
+            let mut tell = |hit: u32, verdict: &Judgement| say_refused(name, hit, verdict);
+            let brought = if has_all_channels(path, plan, wishes.calibrate)? {
+                bring_channels(store, &origin, &cell, path, (wishes.calibrate, replace), &mut tell)?
+            } else {
+                let read = read_record_file(path, units).map_err(bad)?;
+                say(path, &read.notes);
+                bring(store, &origin, &cell, read, replace, &mut tell)?
+            };
             taken.add(path, &brought.taken);
             Ok(Some(brought))
         }

@@ -18,6 +18,7 @@ use crate::analyse;
 use crate::campaign::archive::restore::is_archive;
 use crate::campaign::cut::Only;
 use crate::campaign::import::CellName;
+use crate::campaign::import::assign::Calibrations;
 use crate::campaign::plan::level::Moment;
 use crate::campaign::plan::{configuration_name, structure};
 use crate::campaign::store::Store;
@@ -28,6 +29,7 @@ use crate::frf::Frf;
 use crate::substructuring::geometry::Configuration as Points;
 use crate::untrusted_text::tell_line;
 use folder::Wishes;
+use names::Pattern;
 
 /// Import FRFs or impact records measured with other systems.
 ///
@@ -41,6 +43,11 @@ use folder::Wishes;
 /// A folder that `jointrig export` wrote is imported as a whole with --into alone: plan, sessions,
 /// records with all channels and verdicts, levels, calibrations, notes. The campaign file is made
 /// if it does not exist, and its analysis gives the same results.
+///
+/// Files with all channels (csv with a heading like `hammer (N), LDV_A (mm/s)`, wav, universal
+/// files whose labels name them, npz with names, units, signals and fs) hold one or more hits of a
+/// cell with load cells, specimens and other sensors; --calibrate states the sensitivities of
+/// voltages.
 ///
 /// Any other folder is imported into a campaign file with --into alone: files named
 /// CONFIGURATION_IMPACT_RESPONSE are cells, files named CONFIGURATION contain FRFs, and universal
@@ -79,6 +86,15 @@ pub struct Import {
     /// response=mm/s,force=lbf,time=ms,frequency=rad/s.
     #[arg(long, value_name = "UNITS", default_value = "")]
     units: StatedUnits,
+    /// Folder: the form of the files' names, without ending, such as
+    /// {configuration}_{impact}_{response}_{hit}; without {response} for a plan with fixed sensors.
+    #[arg(long, value_name = "PATTERN", requires = "into", conflicts_with = "names")]
+    pattern: Option<Pattern>,
+    /// Files with all channels: name and sensitivity of recorded voltages,
+    /// CHANNEL=NAME:SENSITIVITY[,…], such as 'ai0=hammer:2.25 mV/N,ai1=LDV_A:125 mm/s/V'; ai3=-
+    /// leaves a channel out.
+    #[arg(long, value_name = "CHANNELS", requires = "into", default_value = "", hide_default_value = true)]
+    calibrate: Calibrations,
     /// Drop earlier records of a file with the same name, and existing FRFs; the file keeps both
     /// and logs the replacement.
     #[arg(long, requires = "into")]
@@ -134,17 +150,21 @@ impl Import {
                 replace,
                 levels: self.levels,
             }),
-            (None, Some(into), None, None, None) if self.names.is_none() && is_archive(&self.file) => {
+            (None, Some(into), None, None, None)
+                if self.names.is_none() && self.pattern.is_none() && is_archive(&self.file) =>
+            {
                 exported::import(&self.file, into)
             }
             (None, Some(into), configuration, None, None) if self.file.is_dir() => {
                 let (configuration, names) = (configuration.as_deref(), self.names.as_deref());
-                folder::import(&self.file, into, &Wishes { configuration, names, replace, units })
+                let (pattern, calibrate) = (self.pattern.as_ref(), &self.calibrate);
+                let wishes = Wishes { configuration, names, pattern, calibrate, replace, units };
+                folder::import(&self.file, into, &wishes)
             }
             (Some(out), ..) => self.convert(out),
             (None, Some(into), Some(configuration), Some(impact), Some(response)) => {
                 let cell = CellName { configuration, impact, response };
-                records::import(&self.file, into, &cell, replace, units)
+                records::import(&self.file, into, &cell, replace, (units, &self.calibrate))
             }
             (None, Some(into), Some(configuration), ..) => {
                 let store = Store::open(into)?;

@@ -2,6 +2,7 @@
 //! labels in a universal file.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use serde::Deserialize;
 
@@ -43,8 +44,63 @@ struct NameRow {
     response: String,
 }
 
-/// Extensions of readable files.
+/// Extensions of readable files; those of universal files are the last three.
 const ENDINGS: [&str; 4] = ["npz", "uff", "unv", "uf"];
+
+/// Extensions of files that are read if their name is that of a cell: folders hold others, too.
+const WITH_A_NAME: [&str; 2] = ["csv", "wav"];
+
+/// The form of file names, such as `{configuration}_{impact}_{response}_{hit}`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Pattern(String);
+
+impl FromStr for Pattern {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = ["{configuration}", "{impact}", "{response}", "{hit}"];
+        let rest = known.iter().fold(text.to_owned(), |rest, name| rest.replacen(name, "", 1));
+        if !text.contains("{impact}") || rest.contains(['{', '}']) {
+            return Err(
+                "write {configuration}, {impact}, {response} and {hit} where the names have them, each once; {impact} is needed"
+                    .into(),
+            );
+        }
+        Ok(Self(text.into()))
+    }
+}
+
+impl Pattern {
+    /// The cell that a name belongs to. Without `{response}` it is the first cell of a row whose
+    /// sensors are fixed, and without `{configuration}` one of `configuration`.
+    fn cell(&self, stem: &str, plan: &Plan, configuration: Option<&str>) -> Option<Cell> {
+        let Self(pattern) = self;
+        let stated = configuration.and_then(|name| plan.configuration(name));
+        let fits = |cell: &Cell| {
+            let of_row = pattern.contains("{response}") || plan.own_channels(&cell.response).is_some();
+            let named = pattern.contains("{configuration}") || stated == Some(cell.configuration);
+            of_row && named && self.writes(stem, plan, cell)
+        };
+        plan.cells().into_iter().find(fits)
+    }
+
+    /// Whether the cell's names in the pattern give this name.
+    fn writes(&self, stem: &str, plan: &Plan, cell: &Cell) -> bool {
+        let names = [configuration_name(cell.configuration), plan.called(cell.configuration)];
+        names.into_iter().any(|name| {
+            let filled = (self.0.replace("{configuration}", name))
+                .replace("{impact}", &cell.impact)
+                .replace("{response}", &cell.response);
+            match filled.split_once("{hit}") {
+                None => filled == stem,
+                Some((before, after)) => {
+                    let hit = stem.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
+                    hit.is_some_and(|hit| !hit.is_empty() && hit.bytes().all(|c| c.is_ascii_digit()))
+                }
+            }
+        })
+    }
+}
 
 /// Every file named in the table.
 pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<NamedFile>, CliError> {
@@ -95,23 +151,30 @@ pub(super) fn from_folder(
     folder: &Path,
     plan: &Plan,
     configuration: Option<&str>,
+    pattern: Option<&Pattern>,
 ) -> Result<(Vec<NamedFile>, Vec<PathBuf>), CliError> {
     let (mut sources, mut left_out, mut unnamed) = (Vec::new(), Vec::new(), Vec::new());
     for path in files(folder)? {
-        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if !ending.is_some_and(|ending| ENDINGS.contains(&&*ending)) {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let by_name = WITH_A_NAME.contains(&&*ending);
+        if !(by_name || ENDINGS.contains(&&*ending)) {
             left_out.push(path);
             continue;
         }
         let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
-        match named(&path, folder, plan, configuration)? {
+        let holds = match (by_cell(&path, plan, configuration, pattern), pattern) {
+            (None, None) if !by_name => by_content(&path, folder, plan, configuration)?,
+            (holds, _) => holds,
+        };
+        match holds {
             Some(holds) => sources.push(NamedFile { path, name, holds }),
+            None if by_name && pattern.is_none() => left_out.push(path),
             None => unnamed.push(name),
         }
     }
     if !unnamed.is_empty() {
         return Err(bad(format!(
-            "{}: it is not clear what these files hold: {}. Call them CONFIGURATION_IMPACT_RESPONSE (one cell each), CONFIGURATION (FRFs), \
+            "{}: it is not clear what these files hold: {}. Say the form of their names with --pattern '{{configuration}}_{{impact}}_{{response}}_{{hit}}', or call them CONFIGURATION_IMPACT_RESPONSE (one cell each), CONFIGURATION (FRFs), \
              put universal files whose labels name impact and response into a folder named after the configuration, say --configuration, or \
              give --names TABLE.csv with the columns file, configuration, impact, response",
             folder.display(),
@@ -119,17 +182,21 @@ pub(super) fn from_folder(
         )));
     }
     if sources.is_empty() {
-        return Err(bad(format!("{}: it holds no .npz, .uff or .unv file", folder.display())));
+        return Err(bad(format!(
+            "{}: it holds no .npz, .uff or .unv file, and no .csv or .wav file with the name of a cell",
+            folder.display()
+        )));
     }
     Ok((sources, left_out))
 }
 
-fn named(
+/// The cell whose names the file's name has, in the form of the pattern or of an export.
+fn by_cell(
     path: &Path,
-    folder: &Path,
     plan: &Plan,
     configuration: Option<&str>,
-) -> Result<Option<Named>, CliError> {
+    pattern: Option<&Pattern>,
+) -> Option<Named> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // names of points may contain an underscore
     let called = |cell: &Cell| {
@@ -139,13 +206,25 @@ fn named(
             // as it is, or as `export` writes names that are not valid file names
             .any(|name| name == *stem || file_name(&name) == *stem)
     };
-    if let Some(Cell { configuration, impact, response, .. }) = plan.cells().into_iter().find(called) {
-        return Ok(Some(Named::Cell {
-            configuration: configuration_name(configuration).into(),
-            impact,
-            response,
-        }));
-    }
+    let found = match pattern {
+        Some(pattern) => pattern.cell(&stem, plan, configuration),
+        None => plan.cells().into_iter().find(called),
+    };
+    found.map(|Cell { configuration, impact, response, .. }| Named::Cell {
+        configuration: configuration_name(configuration).into(),
+        impact,
+        response,
+    })
+}
+
+/// What a file without a cell's name holds, by its configuration and its content.
+fn by_content(
+    path: &Path,
+    folder: &Path,
+    plan: &Plan,
+    configuration: Option<&str>,
+) -> Result<Option<Named>, CliError> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let above = path.parent().filter(|above| *above != folder).and_then(Path::file_name);
     let above = above.map(|name| name.to_string_lossy().into_owned());
     let known = |name: &str| plan.configuration(name).map(|found| configuration_name(found).to_owned());
@@ -191,4 +270,29 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
     }
     found.sort();
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::plan::CONTACT;
+
+    #[test]
+    fn a_pattern_finds_the_plans_names_in_a_files_name() {
+        let plan = Plan::parse(CONTACT, "contact.toml").expect("a plan");
+        let found = |pattern: &str, stem: &str| {
+            let pattern: Pattern = pattern.parse().expect("a pattern");
+            let cell = pattern.cell(stem, &plan, Some("B"))?;
+            Some(format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response))
+        };
+        let whole = "{configuration}_{impact}_{response}_{hit}";
+        // a name with the separator in it
+        assert_eq!(found(whole, "AJB_I_MZ_S3_017").as_deref(), Some("AJB/I_MZ/S3"));
+        assert_eq!(found(whole, "AJB_I_MZ_S3"), None);
+        assert_eq!(found(whole, "AJB_I_MZ_S9_1"), None);
+        assert_eq!(found("run 3 {impact}@{response}", "run 3 BZ2@B1").as_deref(), Some("B/BZ2/B1"));
+        // the plan's vibrometer moves, so that the location must be named
+        assert_eq!(found("{configuration}-{impact}-{hit}", "B-BZ2-1"), None);
+        assert!("{response}".parse::<Pattern>().is_err() && "{impact}{place}".parse::<Pattern>().is_err());
+    }
 }
