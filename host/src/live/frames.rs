@@ -116,7 +116,7 @@ mod tests {
         let frames = Frames::default();
         assert!(frames.after(0, 0).is_none());
         let (mut tap, mut view) = tap();
-        tap.begin(2, 7, 1_000.0);
+        tap.begin(2, 2, 7, 1_000.0);
         for n in 0..11_i16 {
             assert!(view.next(Duration::ZERO).is_none());
             tap.fold(&[n, -n]);
