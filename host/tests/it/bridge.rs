@@ -16,7 +16,8 @@ const RATE_HZ: f64 = 51_200.0 / 3.0;
 
 /// A code that tells its scan and channel.
 fn code(scan: usize, channel: usize) -> i32 {
-    (((scan * 64 + channel) % 60_000) as i32 - 30_000) << 8
+    let count = i32::try_from((scan * 64 + channel) % 60_000).expect("small");
+    (count - 30_000) << 8
 }
 
 /// Three seconds of 24-bit codes in blocks of 1000 scans.

@@ -3,6 +3,7 @@
 
 use jointrig::campaign::plan::SMALL;
 use jointrig::campaign::store::Store;
+use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::exchange::{read_frf, read_impacts, write_impacts};
 use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_tests::command::jointrig;
@@ -150,7 +151,7 @@ fn as_text(measured: &Path, folder: &Path) -> Vec<f64> {
     let store = Store::open_read_only(measured).unwrap();
     let cells = store.cells().unwrap();
     let mut sums = Vec::new();
-    for row in store.records().unwrap().into_iter().flatten().filter(|row| row.kept()) {
+    for row in store.records().unwrap().into_iter().flatten().filter(RecordRow::kept) {
         let (map, samples) = (store.channels(row.session).unwrap(), store.samples(&row).unwrap());
         let cell = &cells.iter().find(|cell| cell.id == row.cell).unwrap().cell;
         let mut text = "time (s)".to_owned();
@@ -169,7 +170,9 @@ fn as_text(measured: &Path, folder: &Path) -> Vec<f64> {
         // a tenth of the length is enough
         for scan in 0..row.scans.min(12_000) {
             write!(text, "\n{}", scan as f64 / map.fs_hz()).unwrap();
-            signals.iter().for_each(|signal| write!(text, ",{}", signal[scan]).unwrap());
+            for signal in &signals {
+                write!(text, ",{}", signal[scan]).unwrap();
+            }
         }
         let configuration = jointrig::campaign::plan::configuration_name(cell.configuration);
         let name = format!("{configuration}-{}-{} no {}.csv", cell.impact, cell.response, row.id);

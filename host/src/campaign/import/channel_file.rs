@@ -492,8 +492,10 @@ mod tests {
             sample_format: SampleFormat::Int,
         };
         let mut out = hound::WavWriter::create(&path, spec).expect("a file");
-        let codes = [-8_388_608, 1, 8_388_607, -2, 0, 3];
-        codes.into_iter().for_each(|code: i32| out.write_sample(code).expect("written"));
+        let codes = [-8_388_608_i32, 1, 8_388_607, -2, 0, 3];
+        for code in codes {
+            out.write_sample(code).expect("written");
+        }
         out.finalize().expect("whole");
         let read = read_channel_file(&path).expect("readable");
         assert_eq!(read.channels[0].bits, 24);
