@@ -104,6 +104,9 @@ fn an_exported_campaign_comes_back_digit_for_digit_with_what_persons_decided() {
     }
 }
 
+/// A damage to an export: its name, what it does to the folder, and what the refusal says.
+type Damage<'a> = (&'a str, &'a dyn Fn(&Path), &'a str);
+
 #[test]
 fn an_export_that_is_not_whole_is_refused_before_a_file_is_made() {
     let (folder, file) = measured(SMALL);
@@ -116,7 +119,6 @@ fn an_export_that_is_not_whole_is_refused_before_a_file_is_made() {
         all.swap_remove(0)
     };
     let into = at("new.jrig");
-    type Damage<'a> = (&'a str, &'a dyn Fn(&Path), &'a str);
     let damages: [Damage<'_>; 6] = [
         ("missing", &|at| std::fs::remove_file(one_of(at, "channels")).unwrap(), "the file is missing"),
         (
