@@ -431,10 +431,11 @@ fn rate_of(times: &[f64], digit_s: f64) -> Result<f64, String> {
         ));
     }
     let rate_hz = 1.0 / step;
-    // the digits leave a rate undecided by this much; a whole number within it is meant
+    // the digits leave a rate undecided by this much; if only one whole number lies within it, that
+    // is meant
     let doubt = rate_hz * (2.0 * digit_s / length).max(1e-9);
     let whole = rate_hz.round();
-    if (rate_hz - whole).abs() <= doubt {
+    if doubt < 0.5 && (rate_hz - whole).abs() <= doubt {
         return Ok(whole);
     }
     if doubt > 1e-5 * rate_hz {
