@@ -320,7 +320,7 @@ fn the_joint_of_another_structure_comes_out_of_another_systems_files() {
     let settings = &results["source"]["settings"];
     assert_eq!(settings["sliding_direction"], serde_json::json!(ALONG));
     assert_eq!(settings["structure"], "A is frame, B is blade, AJB is frame with blade");
-    assert_eq!(said.matches("load cells").count(), 1, "that there is nothing else is said once: {said}");
+    assert_eq!(said.matches("load cell").count(), 1, "that there is nothing else is said once: {said}");
     assert!(said.starts_with("From imported records: lab.jrig; A is frame"), "{said}");
     let page = std::fs::read_to_string(at("out/report.html")).unwrap();
     assert!(page.contains("frame with blade"));
