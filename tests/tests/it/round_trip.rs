@@ -2,7 +2,7 @@
 //! export that is not complete is refused.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::campaign::plan::{CONTACT, SMALL};
+use jointrig::campaign::plan::{CONTACT, SMALL, configuration_name};
 use jointrig::campaign::store::Store;
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{campaign, done};
@@ -63,11 +63,15 @@ fn samples(file: &Path) -> Vec<(i64, jointrig::device::samples::Samples)> {
 fn an_exported_campaign_comes_back_digit_for_digit_with_what_persons_decided() {
     let (folder, file) = measured(SMALL);
     let at = |name: &str| folder.path().join(name);
-    let rows: Vec<_> =
-        Store::open_read_only(&file).unwrap().records().unwrap().into_iter().flatten().collect();
-    let dropped = rows.iter().find(|row| row.kept()).unwrap().id.to_string();
-    let drop = ["--reason", "a truck, passing"];
-    done(jointrig().args(["campaign", "drop"]).arg(&file).arg(&dropped).args(drop));
+    let store = Store::open_read_only(&file).unwrap();
+    let rows: Vec<_> = store.records().unwrap().into_iter().flatten().collect();
+    let row = rows.iter().find(|row| row.kept()).unwrap();
+    let dropped = row.id.to_string();
+    let cell = store.cells().unwrap().into_iter().find(|cell| cell.id == row.cell).unwrap().cell;
+    let cell = format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response);
+    drop(store);
+    let reason = ["--reason", "a truck, passing"];
+    done(jointrig().args(["campaign", "drop"]).arg(&file).arg(&dropped).args(reason));
     let calibration = "[[channel]]\nname = \"ldv_a\"\nsensitivity_v = 37.3\nserial = \"77\"\n";
     std::fs::write(at("lab.toml"), calibration).unwrap();
     let calibrate = jointrig()
@@ -92,7 +96,7 @@ fn an_exported_campaign_comes_back_digit_for_digit_with_what_persons_decided() {
         } else {
             assert!(samples(&into) == samples(&file), "{name}");
         }
-        let shown = done(jointrig().args(["campaign", "show", "--no-figure"]).arg(&into).arg(&dropped));
+        let shown = done(jointrig().args(["campaign", "show", "--no-figure"]).arg(&into).arg(&cell));
         assert!(shown.contains("a truck, passing"), "{shown}");
         let verified = done(jointrig().args(["campaign", "verify", "--deep"]).arg(&into));
         assert!(verified.contains("all intact"), "{verified}");
