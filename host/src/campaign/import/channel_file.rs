@@ -476,7 +476,8 @@ mod tests {
     fn text_and_wav_keep_every_value() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("hit.csv");
-        let text = "time (s); hammer (N); LDV_A (mm/s)\n0,0000; 0,1; 1\n0,0001; 50,25; 2\n0,0002; 0; -3\n";
+        let text = "time (s); hammer (N); LDV_A (mm/s)\n0,0000000000; 0,1; 1\n\
+                    0,0001000000; 50,25; 2\n0,0002000000; 0; -3\n";
         std::fs::write(&path, text).expect("written");
         let read = read_channel_file(&path).expect("readable");
         assert_eq!((read.fs_hz, read.hits.len()), (10_000.0, 1));
