@@ -36,6 +36,7 @@ def test_the_manual(lab_file: Path, tmp_path: Path) -> None:
     for name in ("A", "B", "AJB"):
         shutil.copy(DATA / "frf_rigid" / f"{name}.npz", tmp_path)
     shutil.copy(DATA / "positions" / "positions.xlsx", tmp_path)
+    shutil.copy(DOCS / "plans" / "small.toml", tmp_path)
     told = run(blocks("python.md"), tmp_path)
     assert (tmp_path / "frf.png").stat().st_size > 10_000
     assert (tmp_path / "results" / "report.html").exists() and (tmp_path / "receptance.npz").exists()
