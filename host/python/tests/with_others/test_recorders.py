@@ -21,7 +21,9 @@ OPENDAQ = """
 from jointrig import bridge
 import opendaq
 
-device = opendaq.Instance().add_device("daqref://device0")
+# devices end with their instance
+instance = opendaq.Instance()
+device = instance.add_device("daqref://device0")
 device.set_property_value("GlobalSampleRate", 50_000)
 signals = [own for own in device.signals_recursive if own.domain_signal]
 bridge.from_opendaq(signals, board="reference", serial=device.info.serial_number)
