@@ -4,7 +4,7 @@
 use crate::frf::Frf;
 use crate::interruptible::Stopped;
 use crate::record::Record;
-use crate::writing::{self, Stated};
+use crate::writing::{self, Arrays, calibrations};
 use crate::{in_the_process_that_loaded_this, interruptible, raised, values};
 use jointrig::analyse::{AnalyseError, CampaignFile, KnownContact, Wanted};
 use jointrig::campaign::plan::level::Level;
@@ -146,7 +146,7 @@ impl Lab {
 
     /// Adds the hits of one cell; jointrig's stub file describes the arguments.
     #[pyo3(signature = (configuration, impact, response=None, *, fs_hz, channels, force_n=None, units=None, scale=None,
-                        delay_s=None, trigger_index=None, source="python", replace=false))]
+                        delay_s=None, calibrate="", trigger_index=None, source="python", replace=false))]
     #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
     fn add_hits<'py>(
         &self,
@@ -160,14 +160,16 @@ impl Lab {
         units: Option<Bound<'py, PyDict>>,
         scale: Option<Bound<'py, PyDict>>,
         delay_s: Option<Bound<'py, PyDict>>,
+        calibrate: &str,
         trigger_index: Option<usize>,
         source: &str,
         replace: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let given = Stated { force_n, channels, units, scale, delay_s }.given(py, &["hit", "sample"])?;
+        let arrays = Arrays { fs_hz, force_n, channels, units, scale, delay_s };
+        let channels = (&arrays.read(py, &["hit", "sample"])?, &calibrations(py, calibrate)?);
         let cell = (configuration, impact, response);
         let (added, verdicts) =
-            writing::add_hits(py, &self.path, cell, fs_hz, &given, trigger_index, source, replace)?;
+            writing::add_hits(py, &self.path, cell, channels, trigger_index, source, replace)?;
         let found = PyDict::new(py);
         found.set_item("hits", added.hits)?;
         found.set_item("kept", added.kept)?;
@@ -177,7 +179,7 @@ impl Lab {
     }
 
     /// Adds a level of the shaker; jointrig's stub file describes the arguments.
-    #[pyo3(signature = (frequency_hz, amplitude, *, fs_hz, channels, units=None, scale=None, delay_s=None, end_hz=None,
+    #[pyo3(signature = (frequency_hz, amplitude, *, fs_hz, channels, units=None, scale=None, delay_s=None, calibrate="", end_hz=None,
                         held="displacement", when="before", source="python"))]
     #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
     fn add_level<'py>(
@@ -190,16 +192,18 @@ impl Lab {
         units: Option<Bound<'py, PyDict>>,
         scale: Option<Bound<'py, PyDict>>,
         delay_s: Option<Bound<'py, PyDict>>,
+        calibrate: &str,
         end_hz: Option<f64>,
         held: &str,
         when: &str,
         source: &str,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let given = Stated { force_n: None, channels, units, scale, delay_s }.given(py, &["sample"])?;
+        let arrays = Arrays { fs_hz, force_n: None, channels, units, scale, delay_s };
+        let channels = (&arrays.read(py, &["sample"])?, &calibrations(py, calibrate)?);
         let held = held.parse().map_err(|what| raised::refused(py, &format!("held is `{held}`: {what}")))?;
         let when = when.parse().map_err(|what| raised::refused(py, &format!("when is `{when}`: {what}")))?;
         let level = Level { frequency_hz, end_hz, held, amplitude };
-        let added = writing::add_level(py, &self.path, level, when, fs_hz, &given, source)?;
+        let added = writing::add_level(py, &self.path, level, when, channels, source)?;
         let found = PyDict::new(py);
         found.set_item("level", added.id)?;
         found.set_item("reached", added.reached)?;

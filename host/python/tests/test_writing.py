@@ -71,6 +71,9 @@ def test_what_cannot_be_used_is_refused_and_nothing_is_stored(small_file: Path, 
         with pytest.raises(jr.Refused, match=sentence):
             lab.add_hits(*cell, **given)  # type: ignore[arg-type]
 
+    refused("channel `typo` .* is not known", channels=channels | {"typo": channels["ldv_a"]}, units=UNITS | {"typo": "m/s"})
+    refused("a scale of 0", scale={"force": 0.0})
+    refused("sensitivity is not known", units=UNITS | {"excitation": "V"})
     refused("channel `ldv_a` has no unit", units={name: unit for name, unit in UNITS.items() if name != "ldv_a"})
     refused("`bananas` is not a known unit", units=UNITS | {"vib_x": "bananas"})
     refused("units names `vib_q`", units=UNITS | {"vib_q": "m/s"})

@@ -43,8 +43,7 @@ impl Dimension {
     pub const FREQUENCY: Dimension = Dimension { time: -1, ..Dimension::NONE };
     /// rad/s.
     const ANGULAR_FREQUENCY: Dimension = Dimension { time: -1, angle: 1, ..Dimension::NONE };
-    /// V.
-    pub const VOLTAGE: Dimension = Dimension { electrical: 1, ..Dimension::NONE };
+    const VOLTAGE: Dimension = Dimension { electrical: 1, ..Dimension::NONE };
     const MASS: Dimension = Dimension { length: -1, time: 2, force: 1, ..Dimension::NONE };
     const PRESSURE: Dimension = Dimension { length: -2, force: 1, ..Dimension::NONE };
     const ANGLE: Dimension = Dimension { angle: 1, ..Dimension::NONE };

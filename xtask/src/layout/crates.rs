@@ -55,7 +55,7 @@ const RULES: [Rule; 19] = [
         uses: &["jointrig-protocol", "jointrig-logs", "jointrig-analysis", "jointrig-uff"],
         behind_a_feature: &["jointrig-hil-sim", "jointrig-bridge", "jointrig-native"],
     },
-    rule("jointrig-python", &["jointrig", "jointrig-protocol"]),
+    rule("jointrig-python", &["jointrig"]),
     rule(
         "jointrig-tests",
         &[

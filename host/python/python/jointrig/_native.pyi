@@ -37,6 +37,7 @@ class Lab:
         units: dict[str, str] | None = None,
         scale: dict[str, float] | None = None,
         delay_s: dict[str, float] | None = None,
+        calibrate: str = "",
         trigger_index: int | None = None,
         source: str = "python",
         replace: bool = False,
@@ -45,8 +46,9 @@ class Lab:
 
         channels: name -> (hit, sample), int16, int32, float32 or float64, stored as they are. The name says what a channel
         is, as in the plan or in exports: force, x, y, z of the response location, LDV_A, LDV_B, LC1 ..., or a fixed sensor's
-        channel; any other is recorded without a use. force_n: the hammer's force in N, the same as channels={"force": ...}.
+        channel; an unknown name is refused. force_n: the hammer's force in N, the same as channels={"force": ...}.
         units: name -> N, m/s, mm/s, g, V ...; scale: name -> units per sample, for codes; delay_s: name -> how late, s.
+        calibrate: sensitivities of voltages and other names, as the command's --calibrate: "ai0=hammer:2.25 mV/N,ai3=-".
         trigger_index: the sample at which the recorder was triggered; hits whose pulse begins elsewhere are refused. Left out,
         each record is aligned by its pulse. response may be left out where all locations have fixed sensors. Returns hits, kept, already (stored by an earlier call
         with the same arrays) and verdicts, a list of (verdict, sentence). source names the origin in the file; replace drops
@@ -62,6 +64,7 @@ class Lab:
         units: dict[str, str] | None = None,
         scale: dict[str, float] | None = None,
         delay_s: dict[str, float] | None = None,
+        calibrate: str = "",
         end_hz: float | None = None,
         held: str = "displacement",
         when: str = "before",

@@ -260,9 +260,14 @@ fn described(
             (quantity, 1.0, factor, *delay_s)
         }
     };
-    if of.is_code() && (full_scale.is_none() || factor != 1.0) {
-        return Err(format!("channel `{in_file}` has codes whose full scale is not known: {remedy}"));
-    }
+    // of codes the full scale is converted, and the samples stay as they came
+    let (range_v, factor) = match (of.is_code(), full_scale) {
+        (true, None) => {
+            return Err(format!("channel `{in_file}` has codes whose full scale is not known: {remedy}"));
+        }
+        (true, Some(full_scale)) => (full_scale * factor, 1.0),
+        (false, full_scale) => (full_scale.unwrap_or(0.0) * factor, factor),
+    };
     let role = role_of(plan, response, name, quantity).ok_or_else(|| {
         format!(
             "channel `{in_file}` ({}) is not known as `{name}`: names are hammer, x, y, z, LDV_A, LDV_B, LC1, excitation, and the \
@@ -279,8 +284,9 @@ fn described(
             name: name.parse().map_err(|_| format!("the name `{name}` is too long: 24 letters at most"))?,
             role,
             quantity,
-            units_per_volt: units_per_volt as f32,
-            range_v: full_scale.unwrap_or(0.0) as f32,
+            // a negative full scale is a reversed sensor
+            units_per_volt: (units_per_volt * if range_v < 0.0 { -1.0 } else { 1.0 }) as f32,
+            range_v: range_v.abs() as f32,
             delay_ns: (1e9 * delay_s).round() as u32,
             bits: *bits,
         },
