@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use jointrig::campaign::plan::CONTACT;
 use jointrig::campaign::run::error::RunError;
 use jointrig::campaign::run::runner::{self, Options, Summary};
 use jointrig::campaign::run::stage::Stage;
@@ -12,9 +13,11 @@ use jointrig::campaign::store::Store;
 use jointrig::campaign::store::record_table::RecordRow;
 use jointrig::campaign::verdict::judge::ByRecord;
 use jointrig::campaign::watch::Watchers;
-use jointrig::device::samples::Samples;
+use jointrig::device::address::Address;
+use jointrig::device::samples::{SampleType, Samples};
 use jointrig::device::session::Session;
 use jointrig::device::transport::Transport;
+use num_complex::Complex;
 
 /// A plan of few cells: geometry and limits of the demo plan, with other cells and hits.
 #[must_use]
@@ -33,6 +36,66 @@ pub fn by_hand(wanted: u32, cells: &[(&str, &[&str], &[&str])]) -> String {
 #[must_use]
 pub fn small_plan(cells: &[(&str, &[&str], &[&str])]) -> String {
     with_cells(include_str!("../../docs/plans/small.toml"), cells)
+}
+
+/// The contact plan with 42 hits of one second.
+#[must_use]
+pub fn short_contact_plan() -> String {
+    let mut text = CONTACT.to_owned();
+    for (old, new) in [
+        ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
+        ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\", \"I_MZ\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
+        ("[\"S1\", \"S2\", \"S3\", \"S4\", \"S5\", \"S6\",", "[\"S1\", \"S3\", \"S5\","),
+        ("length_s = 2.0", "length_s = 1.0"),
+        ("exponential_per_s = 2.3", "exponential_per_s = 4.6"),
+    ] {
+        assert!(text.contains(old), "{old}");
+        text = text.replace(old, new);
+    }
+    text
+}
+
+/// A hit as measured.
+pub struct MeasuredHit {
+    /// The hammer's force, N.
+    pub force_n: Vec<f64>,
+    /// The response along z, m/s.
+    pub velocity_z: Vec<f64>,
+    /// Type of the samples.
+    pub of: SampleType,
+}
+
+/// The second of two hits at AZ3 on A, with the response at A3, on the simulated rig that this TOML
+/// describes.
+#[must_use]
+pub fn second_hit_on_a(rig: &str) -> MeasuredHit {
+    let folder = tempfile::tempdir().unwrap();
+    let (description, file) = (folder.path().join("rig.toml"), folder.path().join("c.jrig"));
+    std::fs::write(&description, rig).unwrap();
+    let address: Address = format!("sim:{}", description.display()).parse().unwrap();
+    let (summary, _) = run(&file, &plan(2, &[("A", &["AZ3"], &["A3"])]), address.open(5).unwrap());
+    assert_eq!(summary.kept, 2);
+    let store = Store::open_read_only(&file).unwrap();
+    let row = rows(&store).swap_remove(1);
+    let (channels, samples) = (store.channels(row.session).unwrap(), store.samples(&row).unwrap());
+    let of = |name: &str| {
+        let place = channels.named(name).unwrap();
+        (channels.to_si(place, samples.channel(place)), samples.channel(place).of())
+    };
+    let ((force_n, _), (velocity_z, of)) = (of("force"), of("vib_z"));
+    MeasuredHit { force_n, velocity_z, of }
+}
+
+impl MeasuredHit {
+    /// The mobility at the complex frequency `s`, 1/s, where the transforms of force and velocity
+    /// converge; the rectangular window of the force is 8 ms.
+    #[must_use]
+    pub fn mobility(&self, s: Complex<f64>) -> Complex<f64> {
+        let transform = |signal: &[f64]| -> Complex<f64> {
+            signal.iter().enumerate().map(|(i, x)| *x * (-s * (i as f64 / 51_200.0)).exp()).sum()
+        };
+        transform(&self.velocity_z) / transform(&self.force_n[..410])
+    }
 }
 
 /// The plan `whole` with other cells.
@@ -62,9 +125,14 @@ pub struct Kept {
     pub samples: Samples,
 }
 
-/// Runs the plan over `transport`, to its end or to the first error.
+/// Runs the plan over `transport`, to its end or to the first error; a campaign file that exists is
+/// continued.
 pub fn attempt(file: &Path, plan: &str, transport: Box<dyn Transport>) -> Result<Summary, RunError> {
-    let store = Store::create(file, plan, "test plan").unwrap();
+    let store = if file.exists() {
+        Store::open(file).unwrap()
+    } else {
+        Store::create(file, plan, "test plan").unwrap()
+    };
     let mut session = Session::open(transport, "test").unwrap();
     let options = Options {
         stage: Stage::Auto,

@@ -404,7 +404,7 @@ fn recordings_that_cannot_be_cut_are_refused_with_the_reason() {
     assert!(refused(folder, &cut, 1).contains("channel `hammer` at 0.0488 s is not a number"));
     std::fs::write(&run, "no archive").expect("written");
     assert!(refused(folder, &cut, 1).contains("numpy.savez"));
-    // the last hit is cut off by the recording's end: it is told and left out
+    // the last hit is cut off by the recording's end: it is reported and left out
     let end = (person.strikes[5].at_s * FS_HZ) as usize + 500;
     let short: Vec<Vec<f32>> = good.iter().map(|signal| signal[..end].to_vec()).collect();
     write(&run, &short, true);

@@ -4,22 +4,17 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::campaign::run::error::RunError;
-use jointrig::campaign::run::runner::{self, Options, Summary};
-use jointrig::campaign::run::stage::Stage;
+use jointrig::campaign::run::runner::Summary;
 use jointrig::campaign::store::Store;
-use jointrig::campaign::verdict::judge::ByRecord;
-use jointrig::campaign::watch::Watchers;
 use jointrig::device::address::Address;
 use jointrig::device::session::Session;
 use jointrig_hil_sim::play::{Play, Samples, play};
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_tests::campaign::{Kept, by_hand, origins, records, rows};
+use jointrig_tests::campaign::{self, Kept, by_hand, origins, records, rows};
 use jointrig_tests::command::{binary, jointrig};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::Stdio;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 const RIG: &str = include_str!("../../../hil-sim/rigs/by-hand.toml");
@@ -38,7 +33,7 @@ struct Stream {
     blocks: Vec<Vec<u8>>,
 }
 
-/// Takes so many bytes, then nobody reads.
+/// Takes so many bytes, then closes the stream.
 struct Taken(Vec<u8>, usize);
 
 impl Write for Taken {
@@ -98,23 +93,7 @@ fn plan(wanted: u32) -> String {
 }
 
 fn attempt(file: &Path, wanted: u32, address: &str) -> Result<Summary, RunError> {
-    let store = if file.exists() {
-        Store::open(file).unwrap()
-    } else {
-        Store::create(file, &plan(wanted), "test plan").unwrap()
-    };
-    let transport = address.parse::<Address>().unwrap().open(0).unwrap();
-    let mut session = Session::open(transport, address).unwrap();
-    let options = Options {
-        stage: Stage::Auto,
-        yes: true,
-        new_structure: false,
-        watch: Watchers::default(),
-        edits: None,
-        answers: None,
-        stop: Arc::new(AtomicBool::new(false)),
-    };
-    runner::run(store, &mut session, &mut ByRecord, &options)
+    campaign::attempt(file, &plan(wanted), address.parse::<Address>().unwrap().open(0).unwrap())
 }
 
 fn verdicts(kept: &[Kept]) -> Vec<&'static str> {
@@ -298,7 +277,7 @@ fn host_and_program_killed_in_the_middle_lose_nothing() {
     host.kill().unwrap();
     host.wait().unwrap();
     let pid = || std::fs::read_to_string(at("pid")).unwrap().trim().to_owned();
-    // the program ends by itself: nobody reads
+    // the program ends by itself, because its output is closed
     let begun = Instant::now();
     while Path::new("/proc").join(pid()).exists() && cfg!(target_os = "linux") {
         assert!(begun.elapsed() < Duration::from_secs(20), "the program outlives the host");

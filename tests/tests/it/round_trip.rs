@@ -2,8 +2,9 @@
 //! export that is not complete is refused.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::campaign::plan::{CONTACT, SMALL, configuration_name};
+use jointrig::campaign::plan::{SMALL, configuration_name};
 use jointrig::campaign::store::Store;
+use jointrig_tests::campaign::short_contact_plan;
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{campaign, done};
 use serde_json::Value;
@@ -190,25 +191,9 @@ fn an_export_that_is_not_whole_is_refused_before_a_file_is_made() {
     assert_eq!(samples(&elsewhere), []);
 }
 
-/// Forty-two hits of one second.
-fn contact() -> String {
-    let mut text = CONTACT.to_owned();
-    for (old, new) in [
-        ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
-        ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\", \"I_MZ\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
-        ("[\"S1\", \"S2\", \"S3\", \"S4\", \"S5\", \"S6\",", "[\"S1\", \"S3\", \"S5\","),
-        ("length_s = 2.0", "length_s = 1.0"),
-        ("exponential_per_s = 2.3", "exponential_per_s = 4.6"),
-    ] {
-        assert!(text.contains(old), "{old}");
-        text = text.replace(old, new);
-    }
-    text
-}
-
 #[test]
 fn a_contact_campaign_with_levels_of_the_shaker_gives_the_same_k_t() {
-    let (folder, file) = measured(&contact());
+    let (folder, file) = measured(&short_contact_plan());
     let at = |name: &str| folder.path().join(name);
     let levels = ["--freq", "250", "--amplitude", "5e-8,1e-7,2e-7", "--seconds", "0.5"];
     done(jointrig().arg("shaker").arg(&file).args(["--yes", "--device", "sim:"]).args(levels));

@@ -4,11 +4,10 @@
 
 use std::fmt::Write as _;
 
-use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig::device::samples::{ChannelView, SampleType};
 use jointrig_hil_sim::rig::{Configuration, Quantity, RigConfig, exact_frf};
-use jointrig_tests::campaign::{plan, rows, run};
+use jointrig_tests::campaign::{plan, run, second_hit_on_a};
 use num_complex::Complex;
 
 /// Window's decay, 1/s, as in the plan.
@@ -31,24 +30,7 @@ fn rig(bits: u8, noise_db: f64, m_per_s_per_v: f64) -> String {
 /// from the second hit of a campaign on this rig, and the type of its samples.
 fn error_far_below_the_peak(rig: &str) -> (f64, SampleType) {
     let config = RigConfig::from_toml(rig).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let description = folder.path().join("rig.toml");
-    std::fs::write(&description, rig).unwrap();
-    let file = folder.path().join("c.jrig");
-    let address: Address = format!("sim:{}", description.display()).parse().unwrap();
-    let (summary, _) = run(&file, &plan(2, &[("A", &["AZ3"], &["A3"])]), address.open(5).unwrap());
-    assert_eq!(summary.kept, 2);
-
-    let store = Store::open_read_only(&file).unwrap();
-    let rows = rows(&store);
-    let channels = store.channels(rows[1].session).unwrap();
-    let samples = store.samples(&rows[1]).unwrap();
-    let place = |name: &str| channels.named(name).unwrap();
-    let si = |name: &str| channels.to_si(place(name), samples.channel(place(name)));
-    let (force, velocity) = (si("force"), si("vib_z"));
-    let transform = |signal: &[f64], s: Complex<f64>| -> Complex<f64> {
-        signal.iter().enumerate().map(|(i, x)| *x * (-s * (i as f64 / 51_200.0)).exp()).sum()
-    };
+    let hit = second_hit_on_a(rig);
     let line = |i: i32| Complex::new(SIGMA, std::f64::consts::TAU * 2.0 * f64::from(i));
     let s: Vec<Complex<f64>> = (5..=500).map(line).collect();
     let impact = config.impact(Configuration::A, "AZ3").unwrap().probe();
@@ -60,14 +42,12 @@ fn error_far_below_the_peak(rig: &str) -> (f64, SampleType) {
     for (s, exact) in s.iter().zip(&exact) {
         let exact = exact[(0, 0)];
         if (-110.0..-90.0).contains(&(20.0 * (exact.norm() / peak).log10())) {
-            // the force is 0 after its window of 8 ms
-            let measured = transform(&velocity, *s) / transform(&force[..410], *s) / s;
-            sum += (measured / exact - 1.0).norm_sqr();
+            sum += (hit.mobility(*s) / s / exact - 1.0).norm_sqr();
             count += 1;
         }
     }
     assert!(count > 50, "{count} lines");
-    ((sum / f64::from(count)).sqrt(), samples.channel(place("vib_z")).of())
+    ((sum / f64::from(count)).sqrt(), hit.of)
 }
 
 /// Noise of 120 dB: at a tenth of the range an FRF 100 dB below its peak is right to 1 %; with 16
