@@ -75,20 +75,26 @@ pub enum PlayError {
     /// The rig's description, or a cell's name.
     #[error(transparent)]
     Rig(#[from] RigError),
-    /// Nobody strikes.
-    #[error("nobody strikes this rig: its description needs [hammer.hand] with every_s and pulse_s")]
+    /// The rig has no hammer by hand.
+    #[error("this rig is not hit by hand: its description needs [hammer.hand] with every_s and pulse_s")]
     NoHand,
-    /// Nobody reads the samples, or they cannot be written.
+    /// The rig's converters are wider than the codes that are written.
+    #[error("this rig has converters of {0} bits, and play writes codes of 16 bits: sensors.bits must be 16")]
+    Bits(u8),
+    /// The samples cannot be written.
     #[error("the samples could not be written: {0}")]
     Write(#[from] std::io::Error),
 }
 
-/// Plays until nobody reads any more.
+/// Plays until the reader closes the stream.
 ///
 /// # Errors
 /// [`PlayError`].
 pub fn play(config: &RigConfig, play: &Play, mut to: impl Write) -> Result<(), PlayError> {
     let every_s = config.hammer.hand.ok_or(PlayError::NoHand)?.every_s;
+    if config.sensors.bits != 16 {
+        return Err(PlayError::Bits(config.sensors.bits));
+    }
     let mut rig = Rig::new(config, play.seed)?;
     let channels = describe(rig.channels());
     let rate_hz = f64::from(rig.scan_rate_hz());
@@ -111,7 +117,7 @@ pub fn play(config: &RigConfig, play: &Play, mut to: impl Write) -> Result<(), P
         }
     })();
     match outcome {
-        // whoever reads has what it wanted
+        // the reader has closed the stream: this is how a play ends
         Err(PlayError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         other => other,
     }
@@ -215,7 +221,7 @@ mod tests {
 
     const BY_HAND: &str = include_str!("../rigs/by-hand.toml");
 
-    /// Takes so many bytes, then nobody reads.
+    /// Takes so many bytes, then closes the stream.
     struct Reader(Vec<u8>, usize);
 
     impl Write for Reader {
@@ -237,7 +243,7 @@ mod tests {
         let visits = vec!["AJB/AZ3/A3".parse().expect("a cell")];
         let options = Play { seed: 7, visits, hits: 1, samples, block: 100, paced: false };
         let mut reader = Reader(Vec::new(), 30_000);
-        play(&config, &options, &mut reader).expect("until nobody reads");
+        play(&config, &options, &mut reader).expect("until the stream is closed");
         let end = reader.0.iter().position(|byte| *byte == b'\n').expect("a line");
         (String::from_utf8(reader.0[..end].to_vec()).expect("text"), reader.0[end + 1..].to_vec())
     }

@@ -323,7 +323,12 @@ impl Rig {
         self.truth[FORCE] = self.sensors.hammer_n(&self.pending, from_s, to_s);
         self.truth[FIRST_SIGNAL..EXCITATION].copy_from_slice(&self.stepper.signals());
         self.truth[EXCITATION] = shaker_n;
-        let hammer_n: f64 = self.pending.iter().map(|segment| segment.value_n(to_s)).sum();
+        // only fixed sensors read it
+        let hammer_n: f64 = if self.direct.is_empty() {
+            0.0
+        } else {
+            self.pending.iter().map(|segment| segment.value_n(to_s)).sum()
+        };
         if self.pending.first().is_some_and(|segment| segment.end_s <= to_s) {
             self.pending.retain(|segment| segment.end_s > to_s);
         }
