@@ -8,9 +8,9 @@
 //! | 3 | 1 | scans in this block |
 //! | 4 | 4 | session epoch |
 //! | 8 | 8 | absolute index of the first scan |
-//! | 16 | … | scans: for each, one two's-complement 16-bit word per channel, then one further word per wide channel |
+//! | 16 | … | scans: for each, one 16-bit word per channel, then one per wide channel |
 //!
-//! A wide channel ([`crate::channel::Channel::is_wide`]) has codes of up to 30 bits. Its word among
+//! Words are two's complement. A wide channel ([`crate::channel::Channel::is_wide`]) has codes of up to 30 bits. Its word among
 //! the channels contains the upper 16 bits, so that whatever reads 16-bit codes reads the same
 //! quantity; the remaining bits follow after the last channel, in the order of the wide channels.
 //!

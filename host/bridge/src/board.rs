@@ -45,7 +45,7 @@ pub enum OpenError {
     Thread(#[from] std::io::Error),
 }
 
-/// A running device. Dropping it stops it; whoever opened the source closes that first, so that the
+/// A running device. Dropping it stops it. The owner of the source closes that first, so that the
 /// thread that reads it ends too.
 pub struct Bridge {
     header: Header,

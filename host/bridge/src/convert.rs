@@ -2,7 +2,7 @@
 //!
 //! A full scale that is too small clips: those hits get the verdict of a clipped record. One that
 //! is too large wastes codes: below one code of noise, rounding errors no longer average out. Both
-//! are told once per channel.
+//! are reported once per channel.
 
 use jointrig_protocol::channel::Channel;
 

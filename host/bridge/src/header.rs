@@ -3,8 +3,10 @@
 //! ```json
 //! {"jointrig_bridge": 1, "board": "NI cDAQ-9178", "serial": "1A2B3C", "rate_hz": 25600,
 //!  "sample": "f32", "channels": [
-//!   {"name": "force", "role": "hammer_force", "unit": "N", "sensitivity_v": 0.00225, "full_scale": 5},
-//!   {"name": "vib_z", "role": "response_z", "unit": "m/s", "sensitivity_v": 200, "full_scale": 10}]}
+//!   {"name": "force", "role": "hammer_force", "unit": "N",
+//!    "sensitivity_v": 0.00225, "full_scale": 5},
+//!   {"name": "vib_z", "role": "response_z", "unit": "m/s",
+//!    "sensitivity_v": 200, "full_scale": 10}]}
 //! ```
 //!
 //! (In the stream it is one line.)
@@ -12,7 +14,7 @@
 //! | field | meaning |
 //! |---|---|
 //! | `jointrig_bridge` | version of the format: 1 |
-//! | `board`, `serial` | name and serial number of the recorder; the same in every run, because a campaign is continued only with the recorder that it was begun with |
+//! | `board`, `serial` | name and serial number of the recorder, the same in every run |
 //! | `rate_hz` | scans per second; need not be an integer |
 //! | `sample` | `i16`, `i32`, `f32` or `f64` |
 //! | `bits` | for `i32`: bits that a full scale has, e.g. 24 for codes of ±2²³; 32 if absent |
@@ -20,9 +22,12 @@
 //! | `name` | of the channel, up to 24 bytes |
 //! | `role` | what the channel is for ([`ROLES`]); `auxiliary` if absent |
 //! | `unit` | of what it measures ([`UNITS`]) |
-//! | `sensitivity_v` | volts per unit, negative for a reversed sensor. If given, samples and `full_scale` are in volts, otherwise in `unit` |
+//! | `sensitivity_v` | V per unit, negative for a reversed sensor; optional |
 //! | `full_scale` | largest value of a sample, above 0; the largest code of integer samples |
 //! | `delay_s` | how late its samples are, s; 0 if absent |
+//!
+//! With `sensitivity_v`, samples and `full_scale` are in volts, otherwise in `unit`. A campaign is
+//! continued only with the recorder that it was begun with.
 
 use std::io::{BufRead, Read};
 

@@ -64,7 +64,7 @@ struct State {
 #[derive(Debug)]
 pub struct Queue {
     state: Mutex<State>,
-    /// There is room, or the device has ended.
+    /// Signals that the queue has room again, or that the device has ended.
     room: Condvar,
     channels: usize,
     most: u64,

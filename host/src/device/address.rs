@@ -7,7 +7,7 @@
 //! | `tcp:HOST:PORT` | a socket |
 //! | `qemu:` or `qemu:IMAGE` | the firmware in the emulator, with the built-in rig |
 //! | `usb:` or `usb:SERIAL` | the controller's vendor interface: the only one, or by serial |
-//! | `bridge:COMMAND` | a program that writes a recorder's blocks of samples to its standard output |
+//! | `bridge:COMMAND` | a program that writes a recorder's samples to its standard output |
 //! | `bridge:tcp:HOST:PORT` | such a program on another computer |
 //! | `replay:` | known, but not supported by this version |
 

@@ -14,16 +14,16 @@ use super::npz::{Array, NpzFile};
 use super::uff::{Function, Values, kind};
 use crate::{advice, untrusted_input};
 
-/// Why an exported file cannot be read.
+/// Why a file of signals cannot be read: one that an export wrote, or one of another recorder.
 #[derive(Debug, thiserror::Error)]
-pub enum ExportedError {
+pub enum SignalFileError {
     /// An npz file.
     #[error(transparent)]
     Npz(#[from] NpzError),
     /// A universal file.
     #[error(transparent)]
     Uff(#[from] FrfUffError),
-    /// A text file cannot be opened.
+    /// It cannot be opened.
     #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
     Open {
         /// The file.
@@ -31,12 +31,12 @@ pub enum ExportedError {
         /// The operating system's error.
         source: io::Error,
     },
-    /// The file does not have the form of an exported one.
-    #[error("{}: {what}: export it again", path.display())]
+    /// Its content is not as expected.
+    #[error("{}: {what}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// What is wrong, and what to do.
         what: String,
     },
 }
@@ -66,7 +66,7 @@ pub enum Holding {
 ///
 /// # Errors
 /// The file cannot be read, or does not have the form of an exported one.
-pub fn read_exported(path: &Path, holding: Holding, bytes: u64) -> Result<Signals, ExportedError> {
+pub fn read_exported(path: &Path, holding: Holding, bytes: u64) -> Result<Signals, SignalFileError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     match ending.as_deref() {
         Some("npz") => of_npz(path, holding, bytes),
@@ -76,8 +76,9 @@ pub fn read_exported(path: &Path, holding: Holding, bytes: u64) -> Result<Signal
     }
 }
 
-fn wrong(path: &Path, what: impl Into<String>) -> ExportedError {
-    ExportedError::Content { path: path.into(), what: what.into() }
+fn wrong(path: &Path, what: impl Into<String>) -> SignalFileError {
+    let what = format!("{}: export it again", what.into());
+    SignalFileError::Content { path: path.into(), what }
 }
 
 /// The rows of an array along its first axes.
@@ -85,7 +86,7 @@ fn rows(array: &Array<f64>, length: usize) -> impl Iterator<Item = Vec<f64>> + '
     array.values.chunks(length.max(1)).map(<[f64]>::to_vec)
 }
 
-fn of_npz(path: &Path, holding: Holding, bytes: u64) -> Result<Signals, ExportedError> {
+fn of_npz(path: &Path, holding: Holding, bytes: u64) -> Result<Signals, SignalFileError> {
     let mut file = NpzFile::open(path)?.allowing(bytes.saturating_add(1 << 20));
     if holding == Holding::Hits {
         let force = file.real("force", "(hit, sample), N")?;
@@ -116,7 +117,7 @@ fn of_npz(path: &Path, holding: Holding, bytes: u64) -> Result<Signals, Exported
     Ok(Signals { names, records, values })
 }
 
-fn of_uff(path: &Path, holding: Holding) -> Result<Signals, ExportedError> {
+fn of_uff(path: &Path, holding: Holding) -> Result<Signals, SignalFileError> {
     let contents = contents(path)?;
     if let Some(fault) = contents.faults.first() {
         return Err(wrong(path, format!("{fault}")));
@@ -152,9 +153,9 @@ fn name_of(function: &Function) -> Option<String> {
     function.id[0].split_once(", ").map(|(_, name)| name.to_owned())
 }
 
-fn of_csv(path: &Path, holding: Holding) -> Result<Signals, ExportedError> {
+fn of_csv(path: &Path, holding: Holding) -> Result<Signals, SignalFileError> {
     let opened = untrusted_input::open(path);
-    let (file, _) = opened.map_err(|source| ExportedError::Open { path: path.into(), source })?;
+    let (file, _) = opened.map_err(|source| SignalFileError::Open { path: path.into(), source })?;
     let mut reader: csv::Reader<File> = csv::Reader::from_reader(file);
     let failed = |error: csv::Error| wrong(path, error.to_string());
     let heading = reader.headers().map_err(failed)?.clone();

@@ -27,7 +27,7 @@ use crate::campaign::store::session_table::{EdgeRow, TemperatureRow};
 use crate::campaign::store::stored::SampleTypes;
 use crate::device::channels::ChannelMap;
 use crate::device::samples::{ChannelSamples, SampleType, Samples};
-use crate::exchange::exported::{ExportedError, Holding, Signals, read_exported};
+use crate::exchange::exported::{Holding, SignalFileError, Signals, read_exported};
 use crate::exchange::{NpzError, read_frf};
 use crate::{advice, untrusted_input};
 
@@ -45,7 +45,7 @@ pub enum RestoreError {
     Store(#[from] StoreError),
     /// A file of signals.
     #[error(transparent)]
-    Signals(#[from] ExportedError),
+    Signals(#[from] SignalFileError),
     /// FRFs that were imported.
     #[error(transparent)]
     Npz(#[from] NpzError),
@@ -606,8 +606,9 @@ impl Archive<'_> {
             }
         }
         let lines = store.log_lines(0)?;
+        let lines: HashSet<_> = lines.iter().map(|(_, utc, text)| (utc, text)).collect();
         for own in &document.log {
-            if !lines.iter().any(|(_, utc, text)| (utc, text) == (&own.utc, &own.text)) {
+            if !lines.contains(&(&own.utc, &own.text)) {
                 store.copy_log(own.clone())?;
             }
         }

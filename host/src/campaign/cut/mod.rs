@@ -27,13 +27,13 @@ use std::ops::Range;
 
 use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_protocol::request::Configuration;
-use jointrig_protocol::shot::{Phase, Shot};
 
 use self::alike::{Answer, Answers};
 use self::hits::{ForceLevels, FoundHit, HitCriteria, HitFinder};
 use self::levels::{SteadyCriteria, SteadyFinder, SteadyPart};
 use self::places::{Fitted, HitEvidence, Named, PlaceOrder, Unclear};
 use self::recording::LongRecording;
+use crate::campaign::import;
 use crate::campaign::plan::level::{Held, Level};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::run::shaking::Meter;
@@ -299,30 +299,20 @@ fn judged(
     if let Some((force_n, responses)) = own.split_first() {
         hit.answer = answers.of(force_n, responses, &signals(&quiet, before));
     }
-    let recording = as_measured(samples, &found, (found.start - range.start) as usize);
+    let trigger_index = (found.start - range.start) as usize;
+    let recording = Recording {
+        epoch: 0,
+        first_scan: range.start,
+        trigger_index,
+        samples,
+        gaps: Vec::new(),
+        shot: import::shot(0, trigger_index, found.peak_n, found.width_s),
+    };
     // records are judged without regard to their cell
     let cell =
         Cell { configuration: Configuration::A, impact: String::new(), response: String::new(), wanted: 0 };
     hit.verdict = Some(ByRecord.judge(&cell, plan, map, &recording, &Others::default()));
     Ok(hit)
-}
-
-/// The record of a hit, in the form in which records are judged.
-fn as_measured(samples: Samples, found: &FoundHit, trigger_index: usize) -> Recording {
-    let shot = Shot {
-        number: 0,
-        phase: Phase::Done,
-        fired_at: found.start,
-        trigger: found.start,
-        pulse_us: 0,
-        peak_n: found.peak_n as f32,
-        width_us: (1e6 * found.width_s) as f32,
-        rebound_ratio: 0.0,
-        rebound_after: 0,
-        friction_peak_n: 0.0,
-        quiet_ratio: 0.0,
-    };
-    Recording { epoch: 0, first_scan: found.start, trigger_index, samples, gaps: Vec::new(), shot }
 }
 
 /// The samples of a hit's record, each channel of the type in which it came, and the index of its

@@ -9,10 +9,10 @@
 //! - as many groups of enough hits as the plan has places, between any two places that are known
 //!   (from the user's table);
 //! - no hit whose answer is neither the same as that of a group nor clearly different from all;
-//! - no two neighbouring groups that may be one place struck wrongly: together no more hits than one
-//!   place should have, and no pause between them;
-//! - no group of few hits without a pause before and after it, and none that comes first: hits beside
-//!   the point, or test taps.
+//! - no two neighbouring groups that may be one place struck wrongly: together no more hits than
+//!   one place should have, and no pause between them;
+//! - no group of few hits without a pause before and after it, and none that comes first: hits
+//!   beside the point, or test taps.
 //!
 //! Counting hits alone decides nothing: a place may have too few hits, or more than wanted because
 //! some were repeated. A group of few hits is no place (test taps, or a hit beside the point); its

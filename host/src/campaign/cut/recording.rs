@@ -9,7 +9,7 @@
 //! | `names`, `units` | (channel) | each channel's name and unit |
 //! | `signals` | (channel, sample) or (sample, channel) | int16, int32, float32 or float64 |
 //! | or one array per channel, with its name | (sample) | the same |
-//! | `full_scale` (for integers) | (channel) or () | value of the largest code, in the channel's unit |
+//! | `full_scale` (for integers) | (channel) or () | value of the largest code, in its unit |
 //! | `bits` (for int32) | (channel) or () | of the converter; 32 without it |
 //! | `delay_s` (if known) | (channel) | delay of each channel, s |
 

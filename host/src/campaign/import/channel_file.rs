@@ -2,46 +2,20 @@
 //! comma-separated text with a heading, WAV, universal files, npz. Names and units are as the file
 //! states them; [`assign`](super::assign) finds what each channel is.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use hound::{SampleFormat, WavReader};
 
 use crate::device::samples::{ChannelSamples, Samples};
-use crate::exchange::frf_uff::{FrfUffError, contents};
+use crate::exchange::delimiter;
+use crate::exchange::exported::SignalFileError;
+use crate::exchange::frf_uff::contents;
 use crate::exchange::npz::NpzFile;
 use crate::exchange::uff::{Abscissa, Function, Values, kind, quantity};
-use crate::exchange::{NpzError, delimiter};
-use crate::{advice, untrusted_input};
+use crate::untrusted_input;
 
 /// Largest text or WAV file, bytes: it is read as a whole.
 const MOST: u64 = 2 << 30;
-
-/// Why a file of channels cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum ChannelFileError {
-    /// An npz file.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// A universal file.
-    #[error(transparent)]
-    Uff(#[from] FrfUffError),
-    /// It cannot be opened.
-    #[error("{}: cannot be read: {source}; {}", path.display(), advice::reading(source))]
-    Open {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's error.
-        source: std::io::Error,
-    },
-    /// Its content is not as expected.
-    #[error("{}: {what}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, and what to do.
-        what: String,
-    },
-}
 
 /// A channel as its file describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,8 +50,8 @@ pub struct ChannelFile {
     pub hits: Vec<Samples>,
 }
 
-fn wrong(path: &Path, what: impl Into<String>) -> ChannelFileError {
-    ChannelFileError::Content { path: path.into(), what: what.into() }
+fn wrong(path: &Path, what: impl Into<String>) -> SignalFileError {
+    SignalFileError::Content { path: path.into(), what: what.into() }
 }
 
 /// Unit of a WAV file's samples: the recorder's full scale.
@@ -93,7 +67,7 @@ fn ending(path: &Path) -> String {
 ///
 /// # Errors
 /// The file cannot be read.
-pub fn is_channel_file(path: &Path, all_channels: bool) -> Result<bool, ChannelFileError> {
+pub fn is_channel_file(path: &Path, all_channels: bool) -> Result<bool, SignalFileError> {
     Ok(match ending(path).as_str() {
         "csv" | "txt" | "wav" => true,
         "npz" => {
@@ -109,7 +83,7 @@ pub fn is_channel_file(path: &Path, all_channels: bool) -> Result<bool, ChannelF
 ///
 /// # Errors
 /// The file cannot be read, is damaged, or states neither rate nor time.
-pub fn read_channel_file(path: &Path) -> Result<ChannelFile, ChannelFileError> {
+pub fn read_channel_file(path: &Path) -> Result<ChannelFile, SignalFileError> {
     let read = match ending(path).as_str() {
         "npz" => of_npz(path)?,
         "wav" => of_wav(path)?,
@@ -136,7 +110,7 @@ fn values(own: Vec<f64>) -> ChannelSamples {
 }
 
 /// The samples of one hit; each channel has the same type in all hits of a file.
-fn samples(path: &Path, hits: Vec<Vec<Vec<f64>>>) -> Result<Vec<Samples>, ChannelFileError> {
+fn samples(path: &Path, hits: Vec<Vec<Vec<f64>>>) -> Result<Vec<Samples>, SignalFileError> {
     let channels = hits.first().map_or(0, Vec::len);
     let exact = |channel: usize| {
         let mut all = hits.iter().filter_map(|hit| hit.get(channel)).flatten();
@@ -156,7 +130,7 @@ fn samples(path: &Path, hits: Vec<Vec<Vec<f64>>>) -> Result<Vec<Samples>, Channe
 
 /// `fs`, `names` (channel), `units` (channel), `signals` (hit, channel, sample) or (channel,
 /// sample); if there is `delay_s` (hit, channel) or (channel), that of the first hit.
-fn of_npz(path: &Path) -> Result<ChannelFile, ChannelFileError> {
+fn of_npz(path: &Path) -> Result<ChannelFile, SignalFileError> {
     let mut file = NpzFile::open(path)?;
     let fs_hz = file.number("fs", "the sampling rate, Hz")?;
     let names = file.text("names", "the channels' names")?.values;
@@ -196,9 +170,9 @@ fn of_npz(path: &Path) -> Result<ChannelFile, ChannelFileError> {
 }
 
 /// One hit; names are the channels' numbers from 1, values are parts of the recorder's full scale.
-fn of_wav(path: &Path) -> Result<ChannelFile, ChannelFileError> {
+fn of_wav(path: &Path) -> Result<ChannelFile, SignalFileError> {
     let bytes = untrusted_input::bytes(path, MOST)
-        .map_err(|source| ChannelFileError::Open { path: path.into(), source })?;
+        .map_err(|source| SignalFileError::Open { path: path.into(), source })?;
     let failed = |error: hound::Error| wrong(path, format!("it is not a whole WAV file ({error})"));
     let mut reader = WavReader::new(&bytes[..]).map_err(failed)?;
     let spec = reader.spec();
@@ -237,7 +211,7 @@ fn of_wav(path: &Path) -> Result<ChannelFile, ChannelFileError> {
 }
 
 /// Time responses. A hit has one of each channel: the next hit begins where a channel comes again.
-fn of_uff(path: &Path) -> Result<ChannelFile, ChannelFileError> {
+fn of_uff(path: &Path) -> Result<ChannelFile, SignalFileError> {
     let contents = contents(path)?;
     if let Some(fault) = contents.faults.first() {
         return Err(wrong(path, format!("{fault}")));
@@ -334,9 +308,9 @@ fn unit_of(function: &Function) -> Option<String> {
 
 /// Columns under a heading `NAME (UNIT)`: a column of time, one of each channel, and possibly one
 /// with the number of the hit; or what jointrig exports.
-fn of_text(path: &Path) -> Result<ChannelFile, ChannelFileError> {
+fn of_text(path: &Path) -> Result<ChannelFile, SignalFileError> {
     let opened = untrusted_input::text(path, MOST);
-    let text = opened.map_err(|source| ChannelFileError::Open { path: path.into(), source })?;
+    let text = opened.map_err(|source| SignalFileError::Open { path: path.into(), source })?;
     let between = delimiter(&text);
     let mut reader =
         csv::ReaderBuilder::new().delimiter(between).trim(csv::Trim::All).from_reader(text.as_bytes());

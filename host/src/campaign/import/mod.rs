@@ -516,19 +516,30 @@ fn recording(hit: Hit, pulse: Option<&Pulse>, fs_hz: f64) -> Recording {
         trigger_index: trigger,
         samples: hit.samples,
         gaps: hit.gaps,
-        shot: Shot {
-            number: hit.number,
-            phase: Phase::Done,
-            fired_at: 0,
-            trigger: trigger as u64,
-            pulse_us: 0,
-            peak_n: pulse.map_or(0.0, |pulse| pulse.peak_n as f32),
-            // the pulse's width determines how much of the record before its trigger is needed
-            width_us: pulse.map_or(0.0, |pulse| (1e6 * pulse.width() as f64 / fs_hz) as f32),
-            rebound_ratio: 0.0,
-            rebound_after: 0,
-            friction_peak_n: 0.0,
-            quiet_ratio: 0.0,
-        },
+        shot: shot(
+            hit.number,
+            trigger,
+            pulse.map_or(0.0, |pulse| pulse.peak_n),
+            pulse.map_or(0.0, |pulse| pulse.width() as f64 / fs_hz),
+        ),
+    }
+}
+
+/// The report on a hit that no controller made: its number, the index of its trigger in the record,
+/// its peak, N, and the pulse's width, s. The width determines how much of the record before the
+/// trigger is needed.
+pub(crate) fn shot(number: u32, trigger_index: usize, peak_n: f64, width_s: f64) -> Shot {
+    Shot {
+        number,
+        phase: Phase::Done,
+        fired_at: 0,
+        trigger: trigger_index as u64,
+        pulse_us: 0,
+        peak_n: peak_n as f32,
+        width_us: (1e6 * width_s) as f32,
+        rebound_ratio: 0.0,
+        rebound_after: 0,
+        friction_peak_n: 0.0,
+        quiet_ratio: 0.0,
     }
 }

@@ -21,7 +21,7 @@ pub fn same_name(one: &str, other: &str) -> bool {
 /// | name | role |
 /// |---|---|
 /// | `hammer`, `force`, `hammer_force` | the hammer's force |
-/// | `x`, `y`, `z`, also `vib_x` …, the names of the location's own axes (`A1:x`, `A1:1`, `A1`) | its response |
+/// | `x`, `y`, `z`, also `vib_x` …, its own axes (`A1:x`, `A1:1`, `A1`) | the location's response |
 /// | `LDV_A`, `LDV_B`, also `specimen_a`, `velocity_a` … | the specimens |
 /// | `LC1`, `load_cell_1` … | load cells |
 /// | `excitation`, `stinger` | the shaker's force |

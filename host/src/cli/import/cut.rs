@@ -33,7 +33,7 @@ pub(super) struct Recorded<'r> {
     pub(super) in_order: bool,
     /// The table that names places.
     pub(super) table: Option<&'r Path>,
-    /// Whether hits are told and not stored.
+    /// Whether hits are listed and not stored.
     pub(super) dry_run: bool,
     pub(super) replace: bool,
     /// The steady parts of a shaker's recording are wanted, measured before or after the cells.
@@ -163,7 +163,7 @@ pub(super) fn import(from: &Recorded<'_>) -> Result<(), CliError> {
         lines.push("nothing is stored (--dry-run)".into());
         return output::lines(lines);
     }
-    // told before anything is stored
+    // printed before anything is stored
     output::lines(lines)?;
     let called = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     let origin = origin_of(file, &called)?;

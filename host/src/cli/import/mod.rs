@@ -57,7 +57,7 @@ use names::Pattern;
 ///
 /// A continuous recording (npz with all channels) is cut with --cut: its hits are found, judged and
 /// fitted to the plan's order (--order plan) by the structure's response, or to a table (--table).
-/// What was found is told before it is stored; where a place is not certain, nothing is stored, and
+/// What was found is printed before it is stored; where a place is not certain, nothing is stored, and
 /// the message lists what to state.
 #[derive(Debug, Args)]
 pub struct Import {
