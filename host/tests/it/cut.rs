@@ -418,7 +418,7 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
     // frequency (Hz), amplitude of the displacement (m), steady time (s); a ramp of half a second
     // before each
     let levels = [(60.0, 1e-6, 4.0), (60.0, 3e-6, 4.0), (95.3, 2e-6, 5.0)];
-    let (mut now_s, mut phase, mut before, mut all) = (0.0, 0.0_f64, 0.0, vec![Vec::new(); 4]);
+    let (mut now_s, mut phase, mut before, mut all) = (0.0, 0.0_f64, 0.0, vec![Vec::new(); 5]);
     let mut dice = Xoshiro256PlusPlus::seed_from_u64(12);
     for (hz, amplitude, steady_s) in levels.into_iter().chain([(60.0, 0.0, 1.0)]) {
         let scans = ((steady_s + 0.5) * FS_HZ) as usize;
@@ -430,7 +430,8 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
             // a stiffness of 100 N/um; both specimens move, A five times as far
             let velocity = TAU * hz * now * phase.cos();
             let force = 1e8 * now * phase.sin();
-            let values = [1.25 * velocity, 0.25 * velocity + 1e-9 * noise, force + 1e-3 * noise, force * 1.1];
+            let values =
+                [1.25 * velocity, 0.25 * velocity + 1e-9 * noise, force + 1e-3 * noise, force * 1.1, 2.5];
             all.iter_mut().zip(values).for_each(|(own, value)| own.push(value as f32));
         }
         before = amplitude;
@@ -438,8 +439,9 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let folder = folder.path();
-    let units = ["m/s", "m/s", "N", "N"];
-    write_named(&folder.join("shaker.npz"), &["LDV_A", "LDV_B", "LC1", "excitation"], &units, &all, true);
+    let units = ["m/s", "m/s", "N", "N", "V"];
+    let names = ["LDV_A", "LDV_B", "LC1", "excitation", "tacho"];
+    write_named(&folder.join("shaker.npz"), &names, &units, &all, true);
     let own = plan(1, 1, 2)
         .replace("[geometry]", "[shaker]\nfrequencies_hz = [60.0]\namplitudes_m = [1e-6, 3e-6]\n[geometry]");
     std::fs::write(folder.join("plan.toml"), own).expect("written");
@@ -447,6 +449,7 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
     let cut = ["import", "shaker.npz", "--into", "c.jrig", "--cut", "--levels", "before"];
     let told = done(folder, &cut);
     assert!(told.contains("3 steady parts") && told.contains("c.jrig: 3 levels before the cells"), "{told}");
+    assert!(told.contains("stored without a use: tacho;"), "{told}");
     assert!(told.contains("60 Hz, 3 µm") && told.contains("not in the plan"), "{told}");
     let store = Store::open_read_only(&folder.join("c.jrig")).expect("a campaign");
     let rows: Vec<_> = store.levels().expect("levels").into_iter().flatten().collect();
@@ -464,6 +467,6 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
     for own in &mut all {
         own.truncate(300);
     }
-    write_named(&folder.join("shaker.npz"), &["LDV_A", "LDV_B", "LC1", "excitation"], &units, &all, true);
+    write_named(&folder.join("shaker.npz"), &names, &units, &all, true);
     assert!(refused(folder, &cut, 1).contains("channel `excitation` has no part"));
 }

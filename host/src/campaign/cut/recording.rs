@@ -19,6 +19,7 @@ use std::path::Path;
 use jointrig_protocol::channel::{Channel, Quantity, Role};
 
 use super::CutError;
+use crate::campaign::import::assign::{measured_in, volts};
 use crate::campaign::import::roles::role_of;
 use crate::campaign::plan::Plan;
 use crate::device::channels::ChannelMap;
@@ -26,7 +27,6 @@ use crate::device::samples::{ChannelSamples, ChannelView, SampleType, Samples};
 use crate::exchange::NpzError;
 use crate::exchange::npz::NpzFile;
 use crate::exchange::npz_long::LongArray;
-use crate::exchange::units::{Dimension, Unit};
 
 /// Most elements of an array in which channels alternate that are read at once.
 const PIECE: usize = 1 << 20;
@@ -55,6 +55,7 @@ pub struct LongRecording {
     map: ChannelMap,
     scans: u64,
     types: Vec<SampleType>,
+    unused: Vec<String>,
     source: Source,
 }
 
@@ -71,7 +72,7 @@ impl LongRecording {
             ));
         }
         let (scans, types) = (samples.scans() as u64, samples.types());
-        Ok(Self { name: name.into(), map, scans, types, source: Source::Memory(samples) })
+        Ok(Self { name: name.into(), map, scans, types, unused: Vec::new(), source: Source::Memory(samples) })
     }
 
     /// Opens an npz file.
@@ -113,7 +114,7 @@ impl LongRecording {
         let bits = of_channels("bits", "bits of each channel's converter")?;
         let delays = of_channels("delay_s", "delay of each channel, s")?;
         let types: Vec<SampleType> = signals.iter().map(|signal| type_of(&arrays[signal.array])).collect();
-        let mut channels = Vec::with_capacity(names.len());
+        let (mut channels, mut unused) = (Vec::with_capacity(names.len()), Vec::new());
         for (place, (name, unit)) in names.iter().zip(&units).enumerate() {
             let wrong = |what: String| npz.content(format!("channel `{name}`: {what}"));
             let (quantity, factor) = quantity_of(unit).map_err(wrong)?;
@@ -132,9 +133,13 @@ impl LongRecording {
                 return Err(wrong("`delay_s` must be 0 to 1 s, and `bits` 1 to 32".into()).into());
             }
             let is_code = types[place].is_code();
+            let role = role_of(plan, "", name, quantity);
+            if role.is_none() {
+                unused.push(name.clone());
+            }
             channels.push(Channel {
                 name: name.as_str().try_into().map_err(|_| wrong("the name is too long".into()))?,
-                role: role_of(plan, "", name, quantity).unwrap_or(Role::Auxiliary),
+                role: role.unwrap_or(Role::Auxiliary),
                 quantity,
                 units_per_volt: factor as f32,
                 range_v: if is_code { range as f32 } else { 0.0 },
@@ -146,12 +151,18 @@ impl LongRecording {
         let exact_hz = (rate_hz != fs_hz).then_some(fs_hz);
         let map = ChannelMap { id: 0, rate_hz: rate_hz as u32, exact_hz, channels };
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, map, scans, types, source: Source::File { arrays, signals } })
+        Ok(Self { name, map, scans, types, unused, source: Source::File { arrays, signals } })
     }
 
     /// Its name, for messages.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Channels whose names neither the plan nor the usual names know: they are stored, and no
+    /// analysis uses them.
+    pub fn unused(&self) -> &[String] {
+        &self.unused
     }
 
     /// The channels.
@@ -327,20 +338,10 @@ fn append(own: &mut ChannelSamples, more: ChannelView<'_>) {
 
 /// The quantity of a unit, and its factor to SI.
 fn quantity_of(label: &str) -> Result<(Quantity, f64), String> {
-    let volts = [("V", 1.0), ("mV", 1e-3), ("µV", 1e-6)];
-    if let Some((_, factor)) = volts.into_iter().find(|(unit, _)| *unit == label.trim()) {
-        return Ok((Quantity::Voltage, factor));
+    match volts(label) {
+        Some(factor) => Ok((Quantity::Voltage, factor)),
+        None => measured_in(label).map_err(|what| {
+            format!("its unit `{label}`: {what}; write N, m/s, mm/s, m/s^2, g, m, µm or another unit of force or motion")
+        }),
     }
-    let kinds = [
-        (Dimension::FORCE, Quantity::Force),
-        (Dimension::VELOCITY, Quantity::Velocity),
-        (Dimension::ACCELERATION, Quantity::Acceleration),
-        (Dimension::DISPLACEMENT, Quantity::Displacement),
-    ];
-    let unit = Unit::parse(label, &kinds.map(|(dimension, _)| dimension)).map_err(|error| {
-        format!("its unit `{label}`: {error}; write N, m/s, mm/s, m/s^2, g, m, µm or another unit of force or motion")
-    })?;
-    let kind = kinds.into_iter().find(|(dimension, _)| *dimension == unit.dimension);
-    kind.map(|(_, quantity)| (quantity, unit.factor))
-        .ok_or_else(|| format!("its unit `{label}` is no force or motion"))
 }

@@ -73,7 +73,7 @@ const QUANTITIES: [(Dimension, Quantity); 4] = [
 ];
 
 /// A unit of force or motion: its quantity, and its factor to SI.
-fn measured_in(label: &str) -> Result<(Quantity, f64), String> {
+pub(crate) fn measured_in(label: &str) -> Result<(Quantity, f64), String> {
     let unit =
         Unit::parse(label, &QUANTITIES.map(|(dimension, _)| dimension)).map_err(|error| error.to_string())?;
     let known = QUANTITIES.into_iter().find(|(dimension, _)| *dimension == unit.dimension);
@@ -81,7 +81,7 @@ fn measured_in(label: &str) -> Result<(Quantity, f64), String> {
 }
 
 /// Volts (or full scales) in a unit of voltage; `None` for another unit.
-fn volts(label: &str) -> Option<f64> {
+pub(crate) fn volts(label: &str) -> Option<f64> {
     Some(match label.trim() {
         "V" | FULL_SCALE => 1.0,
         "mV" => 1e-3,

@@ -1,4 +1,4 @@
-//! Imports a continuous recording: its hits are found, fitted to the plan, told, and stored.
+//! Imports a continuous recording: its hits are found, fitted to the plan, printed, and stored.
 
 use std::path::Path;
 
@@ -46,6 +46,18 @@ impl From<CutError> for CliError {
     }
 }
 
+/// The channels that no analysis will use.
+fn unused(recording: &LongRecording) -> Option<String> {
+    let names = recording.unused();
+    (!names.is_empty()).then(|| {
+        format!(
+            "  stored without a use: {}; names that are used are hammer, x, y, z, LDV_A, LDV_B, LC1 …, excitation, and the \
+             channels of the plan's fixed sensors",
+            names.join(", ")
+        )
+    })
+}
+
 /// Numbers of hits, from 1, with ranges.
 fn numbers(hits: &[usize]) -> String {
     let mut ranges: Vec<[usize; 2]> = Vec::new();
@@ -90,6 +102,7 @@ fn levels(from: &Recorded<'_>, mut store: Store, plan: &Plan, moment: Moment) ->
         100.0 * SteadyCriteria::default().tolerance,
         SteadyCriteria::default().least_s
     )];
+    lines.extend(unused(&recording));
     for level in &found {
         lines.push(format!(
             "  {:.2} to {:.2} s: {} (reached {}), {}",
@@ -258,6 +271,7 @@ fn found(recording: &LongRecording, hits: &[CutHit]) -> Vec<String> {
         hits.len(),
         counts.join(", ")
     )];
+    lines.extend(unused(recording));
     for (number, hit) in hits.iter().enumerate() {
         let why = match (&hit.incomplete, &hit.verdict) {
             (Some(why), _) => format!("left out: {why}"),
