@@ -89,3 +89,23 @@ def test_samples_of_another_shape_or_type_are_refused() -> None:
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr.splitlines()
     assert "(n, 1) is needed" in said[0] and "(n, 1) is needed" in said[1], said
     assert "they would be rounded" in said[2], said
+
+
+def test_integers_that_do_not_fit_are_refused() -> None:
+    code = """
+from jointrig import bridge
+import numpy as np
+out = bridge.Source("a box", serial="7", rate_hz=1000, channels=[bridge.Channel("force", "N", full_scale=1)], sample="i16")
+out.write(np.array([[32767], [-32768]]))
+for values in ([[40_000]], np.array([[40_000]], dtype=np.uint16)):
+    try:
+        out.write(values)
+    except ValueError as error:
+        assert "reach 40000" in str(error), error
+    else:
+        raise SystemExit("40000 was written as i16")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    # the header, and the one block of two scans
+    assert len(done.stdout.split(b"\n", 1)[1]) == 24 + 4

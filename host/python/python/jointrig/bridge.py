@@ -137,6 +137,11 @@ class Source:
             raise ValueError(f"samples have the shape {array.shape}: (n, {self._channels}) is needed, one scan per row")
         if not np.can_cast(array.dtype, self._type, "same_kind"):
             raise TypeError(f"samples are {array.dtype}, the source has {self._type}: they would be rounded")
+        if array.size and array.dtype.kind in "iu" and self._type.kind == "i":
+            # a larger integer would change its sign in silence
+            bounds = np.iinfo(self._type)
+            if array.min() < bounds.min or array.max() > bounds.max:
+                raise ValueError(f"samples reach {array.min()} to {array.max()}, the source has {self._type}: use sample=\"i32\" or \"f64\"")
         self._block(array.shape[0], np.ascontiguousarray(array, dtype=self._type).tobytes())
 
     def lost(self, scans: int) -> None:
@@ -162,8 +167,8 @@ class Source:
                 rest = memoryview(data)
                 while rest:
                     rest = rest[os.write(self._file, rest) :]
-        except (BrokenPipeError, ConnectionError, OSError) as error:
-            if not isinstance(error, (BrokenPipeError, ConnectionError)) and error.errno != 22:  # EINVAL: Windows' pipe
+        except OSError as error:
+            if not isinstance(error, ConnectionError) and error.errno != 22:  # EINVAL: Windows' pipe
                 raise
             self._gone.set()
 
