@@ -46,13 +46,15 @@ struct PlayOptions {
     /// Seed of noise, scatter and every position error.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// A cell of the operator's list, for example AJB/AZ3/A3; repeat it for the next one.
+    /// A cell of the operator's list, for example AJB/AZ3/A3, or AJB/AZ3/A3:5 for five hits; repeat
+    /// it for the next one.
     #[arg(long = "visit", value_name = "CELL", required = true)]
     visits: Vec<Visit>,
-    /// Hits in each cell.
+    /// Hits in each cell that states no number of its own.
     #[arg(long, default_value_t = 3)]
     hits: u32,
-    /// Write volts in single precision instead of the converters' codes.
+    /// Write volts (single precision, double for converters of more than 24 bits) instead of the
+    /// converters' codes.
     #[arg(long)]
     volts: bool,
     /// Scans of a block.
@@ -105,7 +107,7 @@ fn description(path: &Path) -> Result<String, String> {
 
 fn run_play(options: PlayOptions) -> Result<(), Box<dyn std::error::Error>> {
     let config = RigConfig::from_toml(&description(&options.rig)?)?;
-    let samples = if options.volts { Samples::F32 } else { Samples::I16 };
+    let samples = if options.volts { Samples::Volts } else { Samples::Codes };
     let PlayOptions { seed, visits, hits, paced, .. } = options;
     let block = options.block as usize;
     let what = Play { seed, visits, hits, samples, block, paced };

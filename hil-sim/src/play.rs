@@ -9,7 +9,7 @@ use std::io::{ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use jointrig_protocol::answer::Info;
-use jointrig_protocol::channel::{Axis, Channel, Role};
+use jointrig_protocol::channel::{Axis, Channel, Role, joined_code, words_per_scan};
 
 use crate::board::describe;
 use crate::rig::{Configuration, Rig, RigConfig, RigError};
@@ -23,14 +23,23 @@ pub struct Visit {
     pub impact: String,
     /// Response point.
     pub response: String,
+    /// Hits, if not those of [`Play::hits`].
+    pub hits: Option<u32>,
 }
 
 impl std::str::FromStr for Visit {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let [configuration, impact, response] = text.split('/').collect::<Vec<_>>()[..] else {
-            return Err(format!("`{text}` is no cell: write e.g. AJB/AZ3/A3"));
+        let (cell, hits) = match text.split_once(':') {
+            None => (text, None),
+            Some((cell, hits)) => {
+                let hits = hits.parse().map_err(|_| format!("`{text}`: `{hits}` is no number of hits"))?;
+                (cell, Some(hits))
+            }
+        };
+        let [configuration, impact, response] = cell.split('/').collect::<Vec<_>>()[..] else {
+            return Err(format!("`{text}` is no cell: write e.g. AJB/AZ3/A3, or AJB/AZ3/A3:5 for five hits"));
         };
         let configuration = match configuration {
             "A" => Configuration::A,
@@ -38,17 +47,17 @@ impl std::str::FromStr for Visit {
             "AJB" => Configuration::Ajb,
             other => return Err(format!("`{other}` is no configuration: write A, B or AJB")),
         };
-        Ok(Self { configuration, impact: impact.into(), response: response.into() })
+        Ok(Self { configuration, impact: impact.into(), response: response.into(), hits })
     }
 }
 
 /// The type of the samples written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Samples {
-    /// The converters' codes.
-    I16,
-    /// Volts.
-    F32,
+    /// The converters' codes: 16-bit integers, or 32-bit ones of converters of more than 16 bits.
+    Codes,
+    /// Volts: in single precision, or in double precision for converters of more than 24 bits.
+    Volts,
 }
 
 /// What is played, and how.
@@ -58,7 +67,7 @@ pub struct Play {
     pub seed: u64,
     /// The cells, in order; after the last hit of the last one, the operator goes on there.
     pub visits: Vec<Visit>,
-    /// Hits in each cell.
+    /// Hits in each cell that states no number of its own.
     pub hits: u32,
     /// Type of the samples.
     pub samples: Samples,
@@ -78,9 +87,6 @@ pub enum PlayError {
     /// The rig has no hammer by hand.
     #[error("this rig is not hit by hand: its description needs [hammer.hand] with every_s and pulse_s")]
     NoHand,
-    /// The rig's converters are wider than the codes that are written.
-    #[error("this rig has converters of {0} bits, and play writes codes of 16 bits: sensors.bits must be 16")]
-    Bits(u8),
     /// The samples cannot be written.
     #[error("the samples could not be written: {0}")]
     Write(#[from] std::io::Error),
@@ -92,21 +98,19 @@ pub enum PlayError {
 /// [`PlayError`].
 pub fn play(config: &RigConfig, play: &Play, mut to: impl Write) -> Result<(), PlayError> {
     let every_s = config.hammer.hand.ok_or(PlayError::NoHand)?.every_s;
-    if config.sensors.bits != 16 {
-        return Err(PlayError::Bits(config.sensors.bits));
-    }
     let mut rig = Rig::new(config, play.seed)?;
     let channels = describe(rig.channels());
     let rate_hz = f64::from(rig.scan_rate_hz());
     // until shortly before the next hit would follow, so that a long record of the last one is
     // whole
-    let stay = ((f64::from(play.hits) + 0.9) * every_s * rate_hz) as u64;
-    let mut blocks = Blocks { play, rate_hz, scans: 0, begun: Instant::now(), bytes: Vec::new() };
+    let stay = |hits: u32| ((f64::from(hits) + 0.9) * every_s * rate_hz) as u64;
+    let form = Form::of(play.samples, config.sensors.bits);
+    let mut blocks = Blocks { play, form, rate_hz, scans: 0, begun: Instant::now(), bytes: Vec::new() };
     let outcome = (|| {
-        to.write_all(header(play, rate_hz, channels).as_bytes())?;
+        to.write_all(header(play, form, rate_hz, channels).as_bytes())?;
         for visit in &play.visits {
             rig.stage(visit.configuration, &visit.impact, &visit.response, 0)?;
-            let until = blocks.scans + stay;
+            let until = blocks.scans + stay(visit.hits.unwrap_or(play.hits));
             while blocks.scans < until {
                 let scans = (until - blocks.scans).min(play.block as u64) as usize;
                 blocks.write(&mut rig, channels, scans, &mut to)?;
@@ -123,12 +127,49 @@ pub fn play(config: &RigConfig, play: &Play, mut to: impl Write) -> Result<(), P
     }
 }
 
+/// The form of a sample in the stream, of converters of so many bits.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    I16,
+    I32(u8),
+    F32(u8),
+    F64(u8),
+}
+
+impl Form {
+    fn of(samples: Samples, bits: u8) -> Self {
+        match samples {
+            Samples::Codes if bits == 16 => Self::I16,
+            Samples::Codes => Self::I32(bits),
+            Samples::Volts if bits <= 24 => Self::F32(bits),
+            Samples::Volts => Self::F64(bits),
+        }
+    }
+
+    /// The fields of the header.
+    fn fields(self) -> String {
+        match self {
+            Self::I16 => "\"sample\":\"i16\"".into(),
+            Self::I32(bits) => format!("\"sample\":\"i32\",\"bits\":{bits}"),
+            Self::F32(bits) => format!("\"sample\":\"f32\",\"bits\":{bits}"),
+            Self::F64(bits) => format!("\"sample\":\"f64\",\"bits\":{bits}"),
+        }
+    }
+
+    /// Adds a code of the converter of this channel.
+    fn write(self, code: i32, channel: &Channel, bytes: &mut Vec<u8>) {
+        let volts = |bits: u8| f64::from(code) * f64::from(channel.range_v) / 2_f64.powi(i32::from(bits) - 1);
+        match self {
+            Self::I16 => bytes.extend((code as i16).to_le_bytes()),
+            Self::I32(_) => bytes.extend(code.to_le_bytes()),
+            Self::F32(bits) => bytes.extend((volts(bits) as f32).to_le_bytes()),
+            Self::F64(bits) => bytes.extend(volts(bits).to_le_bytes()),
+        }
+    }
+}
+
 /// The first line.
-fn header(play: &Play, rate_hz: f64, channels: &[Channel]) -> String {
-    let sample = match play.samples {
-        Samples::I16 => "i16",
-        Samples::F32 => "f32",
-    };
+fn header(play: &Play, form: Form, rate_hz: f64, channels: &[Channel]) -> String {
     let described: Vec<String> = channels
         .iter()
         .map(|channel| {
@@ -145,10 +186,11 @@ fn header(play: &Play, rate_hz: f64, channels: &[Channel]) -> String {
         })
         .collect();
     format!(
-        "{{\"jointrig_bridge\":1,\"board\":\"{}\",\"serial\":\"play-{:016x}\",\"rate_hz\":{rate_hz},\"sample\":\"{sample}\",\
+        "{{\"jointrig_bridge\":1,\"board\":\"{}\",\"serial\":\"play-{:016x}\",\"rate_hz\":{rate_hz},{},\
          \"held\":{},\"channels\":[{}]}}\n",
         Info::VIRTUAL_BOARD,
         play.seed,
+        form.fields(),
         !play.paced,
         described.join(",")
     )
@@ -172,6 +214,7 @@ fn word(role: Role) -> &'static str {
 /// The blocks written so far.
 struct Blocks<'a> {
     play: &'a Play,
+    form: Form,
     rate_hz: f64,
     scans: u64,
     begun: Instant,
@@ -192,17 +235,17 @@ impl Blocks<'_> {
         self.bytes.extend((scans as u32).to_le_bytes());
         // nothing lost before it, no flags
         self.bytes.extend([0; 16]);
-        let mut codes = vec![0; channels.len()];
+        let mut words = vec![0; words_per_scan(channels)];
         for _ in 0..scans {
-            rig.scan(&mut codes);
-            for (code, channel) in codes.iter().zip(channels) {
-                match self.play.samples {
-                    Samples::I16 => self.bytes.extend(code.to_le_bytes()),
-                    Samples::F32 => {
-                        let volts = f32::from(*code) * channel.range_v / 32_768.0;
-                        self.bytes.extend(volts.to_le_bytes());
-                    }
-                }
+            rig.scan(&mut words);
+            let (upper, lower) = words.split_at(channels.len());
+            let mut lower = lower.iter();
+            for (upper, channel) in upper.iter().zip(channels) {
+                let code = match lower.next() {
+                    Some(lower) => joined_code([*upper, *lower], channel.bits),
+                    None => (*upper).into(),
+                };
+                self.form.write(code, channel, &mut self.bytes);
             }
         }
         self.scans += scans as u64;
@@ -238,8 +281,8 @@ mod tests {
         }
     }
 
-    fn played(samples: Samples) -> (String, Vec<u8>) {
-        let config = RigConfig::from_toml(BY_HAND).expect("good");
+    fn played(bits: u8, samples: Samples) -> (String, Vec<u8>) {
+        let config = RigConfig::from_toml(&format!("{BY_HAND}\n[sensors]\nbits = {bits}\n")).expect("good");
         let visits = vec!["AJB/AZ3/A3".parse().expect("a cell")];
         let options = Play { seed: 7, visits, hits: 1, samples, block: 100, paced: false };
         let mut reader = Reader(Vec::new(), 30_000);
@@ -250,7 +293,7 @@ mod tests {
 
     #[test]
     fn the_codes_are_the_rigs_and_the_volts_are_the_codes() {
-        let (header, codes) = played(Samples::I16);
+        let (header, codes) = played(16, Samples::Codes);
         assert!(header.contains(r#"{"name":"vib_z","role":"response_z","unit":"m/s""#), "{header}");
         let mut rig = Rig::new(&RigConfig::from_toml(BY_HAND).expect("good"), 7).expect("good");
         rig.stage(Configuration::Ajb, "AZ3", "A3", 0).expect("known");
@@ -263,11 +306,33 @@ mod tests {
                 scan.chunks_exact(2).map(|code| i16::from_le_bytes([code[0], code[1]])).collect();
             assert_eq!(got, wanted);
         }
-        let (_, volts) = played(Samples::F32);
+        let (_, volts) = played(16, Samples::Volts);
         for (code, volt) in codes[24..3224].chunks_exact(2).zip(volts[24..6424].chunks_exact(4)) {
             let code = f64::from(i16::from_le_bytes([code[0], code[1]]));
             let volt = f64::from(f32::from_le_bytes([volt[0], volt[1], volt[2], volt[3]]));
             assert_eq!(code * 10.0 / 32_768.0, volt);
+        }
+    }
+
+    #[test]
+    fn wide_converters_keep_their_bits() {
+        for (bits, sample, size) in [(24, "f32", 4), (30, "f64", 8)] {
+            let (header, codes) = played(bits, Samples::Codes);
+            assert!(header.contains(&format!("\"sample\":\"i32\",\"bits\":{bits}")), "{header}");
+            let (header, volts) = played(bits, Samples::Volts);
+            assert!(header.contains(&format!("\"sample\":\"{sample}\",\"bits\":{bits}")), "{header}");
+            let mut fine = 0;
+            for (code, volt) in codes[24..6424].chunks_exact(4).zip(volts[24..].chunks_exact(size)) {
+                let code = i32::from_le_bytes([code[0], code[1], code[2], code[3]]);
+                let volt = match *volt {
+                    [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+                    [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+                    _ => panic!("{size} bytes"),
+                };
+                assert_eq!(f64::from(code) * 10.0 / 2_f64.powi(i32::from(bits) - 1), volt);
+                fine += u32::from(code % (1 << (bits - 16)) != 0);
+            }
+            assert!(fine > 1000, "the lower bits are used: {fine}");
         }
     }
 }

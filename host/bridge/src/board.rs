@@ -19,6 +19,7 @@ use jointrig_native::executor::{Poller, Polling, Woken};
 use jointrig_native::link::{DeviceEnd, HostEnd, pair};
 use jointrig_native::tasks::{NativeCore, Parts, run_by_the_clock};
 use jointrig_protocol::answer::Reset;
+use jointrig_protocol::channel::words_per_scan;
 use jointrig_protocol::limits::scans_per_block;
 
 use crate::header::{Header, HeaderError};
@@ -129,7 +130,7 @@ impl Drop for Bridge {
 fn run(header: &Header, queue: &Arc<Queue>, link: &DeviceEnd) {
     // leaked like the ring: a program opens few devices, and the firmware's tables are constant
     let channels: &'static [_] = Box::leak(header.channels.clone().into_boxed_slice());
-    let per_block = scans_per_block(channels.len()).unwrap_or(1) as u64;
+    let per_block = scans_per_block(words_per_scan(channels)).unwrap_or(1) as u64;
     let ring = ((RING_S * header.rate_hz) as u64).clamp(RING_SCANS.0, RING_SCANS.1 - per_block);
     let slots = vec![Slot::EMPTY; ring.div_ceil(per_block) as usize].into_boxed_slice();
     let facts = Facts {

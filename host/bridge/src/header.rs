@@ -17,7 +17,7 @@
 //! | `board`, `serial` | name and serial number of the recorder, the same in every run |
 //! | `rate_hz` | scans per second; need not be an integer |
 //! | `sample` | `i16`, `i32`, `f32` or `f64` |
-//! | `bits` | for `i32`: bits that a full scale has, e.g. 24 for codes of ±2²³; 32 if absent |
+//! | `bits` | for `i32`: bits of a full scale, e.g. 24 for codes of ±2²³; 32 if absent. For `f32` and `f64`: resolution of the recorder; 24 if absent |
 //! | `held` | the source can wait (a file, a simulation); a recorder cannot; `false` if absent |
 //! | `name` | of the channel, up to 24 bytes |
 //! | `role` | what the channel is for ([`ROLES`]); `auxiliary` if absent |
@@ -25,13 +25,14 @@
 //! | `sensitivity_v` | V per unit, negative for a reversed sensor; optional |
 //! | `full_scale` | largest value of a sample, above 0; the largest code of integer samples |
 //! | `delay_s` | how late its samples are, s; 0 if absent |
+//! | `bits` | of this channel alone, instead of the header's |
 //!
 //! With `sensitivity_v`, samples and `full_scale` are in volts, otherwise in `unit`. A campaign is
 //! continued only with the recorder that it was begun with.
 
 use std::io::{BufRead, Read};
 
-use jointrig_protocol::channel::{Axis, Channel, Name, Quantity, Role};
+use jointrig_protocol::channel::{Axis, Channel, NARROW_BITS, Name, Quantity, Role, WIDE_BITS};
 use jointrig_protocol::limits::{CHANNEL_CAPACITY, NAME_BYTES};
 use serde::Deserialize;
 
@@ -43,6 +44,13 @@ pub const MOST_BYTES: u64 = 1 << 16;
 
 /// Scans per second, Hz: the bounds of any device.
 const RATE_HZ: std::ops::RangeInclusive<f64> = 100.0..=2e6;
+
+/// Resolution of a recorder whose samples are floating-point numbers, if it states none: that of
+/// delta-sigma converters, and of single precision.
+const FLOAT_BITS: u8 = 24;
+
+/// Bits of a full scale that can be stated.
+const BITS: std::ops::RangeInclusive<u8> = 8..=32;
 
 /// Longest delay, s.
 const DELAY_S: f64 = 1.0;
@@ -114,12 +122,14 @@ pub struct Header {
     pub rate_hz: f64,
     /// Type of the samples.
     pub sample: Sample,
-    /// Bits of a full scale of integer samples.
-    pub bits: u8,
     /// The source can wait.
     pub held: bool,
-    /// The channels in the order of a scan. A channel's range is its full scale.
+    /// The channels in the order of a scan. A channel's range is its full scale; its bits are those
+    /// of the codes that reach the host.
     pub channels: Vec<Channel>,
+    /// For each channel, bits of a full scale of integer samples, or the resolution of
+    /// floating-point samples.
+    pub bits: Vec<u8>,
 }
 
 /// Why a stream has no valid header.
@@ -168,6 +178,7 @@ struct ChannelLine {
     full_scale: f64,
     #[serde(default)]
     delay_s: f64,
+    bits: Option<u8>,
 }
 
 fn refuse(holds: bool, why: impl FnOnce() -> String) -> Result<(), HeaderError> {
@@ -219,30 +230,36 @@ impl Header {
         refuse((1..=CHANNEL_CAPACITY).contains(&line.channels.len()), || {
             format!("channels: {} are given, 1 to {CHANNEL_CAPACITY} are possible", line.channels.len())
         })?;
-        refuse(line.bits.is_none() || line.sample == Sample::I32, || {
-            "bits is for samples of i32 only".into()
-        })?;
-        let bits = match line.sample {
-            Sample::I16 => 16,
-            Sample::I32 | Sample::F32 | Sample::F64 => line.bits.unwrap_or(32),
-        };
-        refuse((8..=32).contains(&bits), || format!("bits is {bits}: 8 to 32 are possible"))?;
         let mut channels: Vec<Channel> = Vec::with_capacity(line.channels.len());
+        let mut bits = Vec::with_capacity(line.channels.len());
         for own in &line.channels {
-            let channel = channel(own, bits)?;
+            let stated = own.bits.or(line.bits);
+            let own_bits = match line.sample {
+                Sample::I16 => {
+                    refuse(stated.is_none_or(|bits| bits == 16), || "bits is 16 for samples of i16".into())?;
+                    16
+                }
+                Sample::I32 => stated.unwrap_or(32),
+                Sample::F32 | Sample::F64 => stated.unwrap_or(FLOAT_BITS),
+            };
+            refuse(BITS.contains(&own_bits), || {
+                format!("bits is {own_bits}: {} to {} are possible", BITS.start(), BITS.end())
+            })?;
+            let channel = channel(own, sent_bits(own_bits))?;
             refuse(channels.iter().all(|other| other.name != channel.name), || {
                 format!("two channels are named `{}`: each needs its own name", own.name)
             })?;
             channels.push(channel);
+            bits.push(own_bits);
         }
         Ok(Self {
             board: name("board", &line.board)?,
             serial: name("serial", &line.serial)?,
             rate_hz: line.rate_hz,
             sample: line.sample,
-            bits,
             held: line.held,
             channels,
+            bits,
         })
     }
 
@@ -253,6 +270,13 @@ impl Header {
     }
 }
 
+/// Bits of the codes in which samples of so many bits are sent: a recorder of 17 or 18 bits would
+/// lose some in codes of 16, and no code has more than [`WIDE_BITS`].
+fn sent_bits(bits: u8) -> u8 {
+    if bits <= 16 { bits } else { bits.clamp(NARROW_BITS + 1, WIDE_BITS) }
+}
+
+/// A channel that is sent in codes of `bits`.
 fn channel(own: &ChannelLine, bits: u8) -> Result<Channel, HeaderError> {
     let called = name("the channel's name", &own.name)?;
     let given = own.role.as_deref().unwrap_or("auxiliary");
@@ -291,8 +315,7 @@ fn channel(own: &ChannelLine, bits: u8) -> Result<Channel, HeaderError> {
         units_per_volt,
         range_v,
         delay_ns: (own.delay_s * 1e9).round() as u32,
-        // the width in which samples reach the host
-        bits: bits.min(16),
+        bits,
     })
 }
 
@@ -323,6 +346,29 @@ mod tests {
     }
 
     #[test]
+    fn more_than_16_bits_are_sent_as_wide_codes() {
+        let widths = |fields: &str, own: &str| {
+            let line = GOOD
+                .replace("\"sample\":\"f32\"", fields)
+                .replace("\"full_scale\":50", &format!("\"full_scale\":50{own}"));
+            let header = Header::parse(line.as_bytes()).expect("good");
+            (header.bits, header.channels.iter().map(|channel| channel.bits).collect::<Vec<_>>())
+        };
+        for (fields, stated, sent) in [
+            (r#""sample":"i16""#, 16, 16),
+            (r#""sample":"i32""#, 32, 30),
+            (r#""sample":"i32","bits":24"#, 24, 24),
+            (r#""sample":"i32","bits":18"#, 18, 19),
+            (r#""sample":"i32","bits":12"#, 12, 12),
+            (r#""sample":"f64""#, 24, 24),
+            (r#""sample":"f32","bits":16"#, 16, 16),
+        ] {
+            assert_eq!(widths(fields, ""), (vec![stated; 2], vec![sent; 2]), "{fields}");
+        }
+        assert_eq!(widths(r#""sample":"f32""#, ",\"bits\":16"), (vec![24, 16], vec![24, 16]));
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         for (from, to, word) in [
             ("\"rate_hz\":17066.666666666668", "\"rate_hz\":50", "rate_hz is 50"),
@@ -334,7 +380,8 @@ mod tests {
             ("2e-5", "-2e-5", "delay_s"),
             ("\"serial\":\"1A2B\",", "", "missing field `serial`"),
             ("sensitivity_v", "sensitivity", "unknown field `sensitivity`"),
-            ("\"sample\":\"f32\"", "\"sample\":\"f32\",\"bits\":24", "bits is for samples of i32 only"),
+            ("\"sample\":\"f32\"", "\"sample\":\"i16\",\"bits\":24", "bits is 16 for samples of i16"),
+            ("\"full_scale\":50", "\"full_scale\":50,\"bits\":33", "bits is 33: 8 to 32"),
             ("bridge\":1", "bridge\":2", "reads version 1"),
             ("1A2B", "a serial number that is too long", "1 to 24 printable bytes"),
         ] {

@@ -13,6 +13,7 @@ use std::time::Instant;
 use embassy_time::{Duration, Timer};
 use jointrig_firmware::board::{Delivered, Scans};
 use jointrig_native::link::DeviceEnd;
+use jointrig_protocol::channel::words_per_scan;
 use jointrig_protocol::limits::{BLOCK_SAMPLE_BYTES, scans_per_block};
 
 use crate::blocks::Blocks;
@@ -39,7 +40,11 @@ const REMARKS_KEPT: usize = 256;
 /// An entry of the queue.
 #[derive(Debug)]
 enum Entry {
-    Codes(Vec<i16>),
+    /// Words of scans, of which the first `taken` have left the queue.
+    Codes {
+        words: Vec<i16>,
+        taken: usize,
+    },
     Lost(u64),
 }
 
@@ -66,7 +71,8 @@ pub struct Queue {
     state: Mutex<State>,
     /// Signals that the queue has room again, or that the device has ended.
     room: Condvar,
-    channels: usize,
+    /// 16-bit words per scan.
+    words: usize,
     most: u64,
     held: bool,
 }
@@ -79,7 +85,7 @@ impl Queue {
         Self {
             state: Mutex::default(),
             room: Condvar::new(),
-            channels: header.channels.len(),
+            words: words_per_scan(&header.channels),
             most: (seconds * header.rate_hz).ceil() as u64,
             held: header.held,
         }
@@ -123,7 +129,7 @@ impl Queue {
 
     /// Adds scans; false when the device has ended.
     fn push(&self, codes: &[i16]) -> bool {
-        let scans = (codes.len() / self.channels) as u64;
+        let scans = (codes.len() / self.words) as u64;
         let mut state = self.lock();
         while self.held && state.scans >= self.most && !state.closed {
             state = self.room.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -143,7 +149,7 @@ impl Queue {
         }
         let lost = std::mem::take(&mut state.overflowed);
         state.note_lost(lost);
-        state.entries.push_back(Entry::Codes(codes.to_vec()));
+        state.entries.push_back(Entry::Codes { words: codes.to_vec(), taken: 0 });
         state.scans += scans;
         true
     }
@@ -320,7 +326,7 @@ impl QueuedScans {
     /// Takes the scans of this queue; closes the link when no more come.
     #[must_use]
     pub fn new(queue: &Arc<Queue>, link: &DeviceEnd) -> Self {
-        let per_block = scans_per_block(queue.channels).unwrap_or(1);
+        let per_block = scans_per_block(queue.words).unwrap_or(1);
         Self { queue: Arc::clone(queue), link: link.clone(), per_block, turns: 0 }
     }
 
@@ -336,7 +342,7 @@ impl QueuedScans {
             context.waker().wake_by_ref();
             return Poll::Pending;
         }
-        let (channels, per_block) = (self.queue.channels, self.per_block);
+        let (per_scan, per_block) = (self.queue.words, self.per_block);
         let mut locked = self.queue.lock();
         let state = &mut *locked;
         let delivered = match state.entries.front_mut() {
@@ -354,15 +360,17 @@ impl QueuedScans {
                 }
                 Delivered { scans: 0, missed, loud: false }
             }
-            Some(Entry::Codes(codes)) => {
-                let count = codes.len().min(per_block * channels);
-                for (bytes, code) in block.as_chunks_mut::<2>().0.iter_mut().zip(codes.drain(..count)) {
-                    *bytes = code.to_le_bytes();
+            Some(Entry::Codes { words, taken }) => {
+                let rest = &words[*taken..];
+                let count = rest.len().min(per_block * per_scan);
+                for (bytes, word) in block.as_chunks_mut::<2>().0.iter_mut().zip(&rest[..count]) {
+                    *bytes = word.to_le_bytes();
                 }
-                if codes.is_empty() {
+                *taken += count;
+                if *taken == words.len() {
                     state.entries.pop_front();
                 }
-                let scans = count / channels;
+                let scans = count / per_scan;
                 state.scans -= scans as u64;
                 Delivered { scans: scans as u8, missed: 0, loud: true }
             }

@@ -4,19 +4,20 @@
 use jointrig_bridge::blocks::Blocks;
 use jointrig_bridge::convert::{Converter, Run};
 use jointrig_bridge::header::Header;
+use jointrig_protocol::channel::words_per_scan;
 use libfuzzer_sys::fuzz_target;
 
 const GOOD: &str = r#"{"jointrig_bridge":1,"board":"b","serial":"s","rate_hz":1000,"sample":"f32","channels":[{"name":"a","unit":"g","full_scale":50},{"name":"b","unit":"N","sensitivity_v":-0.01,"full_scale":5}]}"#;
 
 fn read(header: &Header, bytes: &[u8]) {
-    let channels = header.channels.len();
+    let words = words_per_scan(&header.channels);
     let mut blocks = Blocks::new(bytes, header.scan_bytes());
     let mut converter = Converter::new(header);
     while let Ok(Some(block)) = blocks.next_block() {
         let (scans, mut seen) = (block.bytes.len() / header.scan_bytes(), 0);
         converter.convert(block.bytes, |run| {
             seen += match run {
-                Run::Codes(codes) => codes.len() / channels,
+                Run::Codes(codes) => codes.len() / words,
                 Run::Invalid(scans) => scans as usize,
             }
         });

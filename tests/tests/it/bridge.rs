@@ -7,6 +7,7 @@ use jointrig::campaign::run::error::RunError;
 use jointrig::campaign::run::runner::Summary;
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
+use jointrig::device::samples::ChannelView;
 use jointrig::device::session::Session;
 use jointrig_hil_sim::play::{Play, Samples, play};
 use jointrig_hil_sim::rig::RigConfig;
@@ -53,10 +54,16 @@ impl Write for Taken {
 impl Stream {
     /// The first seconds of the rig in one cell, with volts in single precision.
     fn of(seconds: f64) -> Self {
+        Self::with_bits(16, seconds, 4)
+    }
+
+    /// The same with converters of so many bits, whose volts have `sample` bytes.
+    fn with_bits(bits: u8, seconds: f64, sample: usize) -> Self {
         let rig = RIG.replace("every_s = 4.0", &format!("every_s = {EVERY_S:?}"));
+        let rig = format!("{rig}\n[sensors]\nbits = {bits}\n");
         let visits = vec!["A/AZ3/A3".parse().unwrap()];
-        let what = Play { seed: 7, visits, hits: 9, samples: Samples::F32, block: BLOCK, paced: false };
-        let size = HEAD + BLOCK * CHANNELS * 4;
+        let what = Play { seed: 7, visits, hits: 9, samples: Samples::Volts, block: BLOCK, paced: false };
+        let size = HEAD + BLOCK * CHANNELS * sample;
         let blocks = (seconds * RATE as f64 / BLOCK as f64).ceil() as usize;
         let mut taken = Taken(Vec::new(), blocks * size);
         play(&RigConfig::from_toml(&rig).unwrap(), &what, &mut taken).unwrap();
@@ -139,6 +146,33 @@ fn lost_scans_are_named_and_their_hit_is_refused() {
     let (summary, kept, log) = measured(&nan);
     assert_eq!((summary.accounts.lost, verdicts(&kept)), (1, vec!["gap", "good"]));
     assert!(log.contains("channel `vib_z`: a sample is not a number"), "{log}");
+}
+
+#[test]
+fn volts_are_stored_to_half_a_code_of_24_bits() {
+    // volts of 30 bits, from a recorder that states 24
+    let mut stream = Stream::with_bits(30, 4.0, 8);
+    stream.header = stream.header.replace("\"bits\":30", "\"bits\":24");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("c.jrig");
+    attempt(&file, 1, &stream.written(folder.path())).unwrap();
+    let store = Store::open_read_only(&file).unwrap();
+    let row = &rows(&store)[0];
+    let samples = store.samples(row).unwrap();
+    let blocks: Vec<&[u8]> = stream.blocks.iter().map(|block| &block[HEAD..]).collect();
+    let volts: Vec<f64> =
+        blocks.concat().as_chunks::<8>().0.iter().map(|sample| f64::from_le_bytes(*sample)).collect();
+    let (mut largest, mut loudest) = (0.0_f64, 0.0_f64);
+    for (place, channel) in samples.each().enumerate() {
+        let ChannelView::I32(codes) = channel else { panic!("{:?}", channel.of()) };
+        for (scan, code) in (row.first_scan as usize..).zip(codes) {
+            let source = volts[scan * CHANNELS + place] / 10.0 * 2_f64.powi(23);
+            largest = largest.max((f64::from(*code) - source).abs());
+            loudest = loudest.max(source.abs());
+        }
+    }
+    assert!(largest <= 0.5 && largest > 0.49, "{largest} of a code");
+    assert!(loudest > 2_f64.powi(19), "the hit is in the record: {loudest}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use jointrig::device::address::Address;
+use jointrig::device::samples::SampleType;
 use jointrig::device::transport::Transport;
 use jointrig_tests::campaign::{Kept, by_hand, plan, run};
 use jointrig_tests::command::{Served, binary};
@@ -69,7 +70,7 @@ fn a_bridge_carries_the_same_records() {
     let cells = by_hand(2, &[("A", &["AZ3"], &["A3"]), ("AJB", &["AZ3"], &["A3", "B3"])]);
     // the operator strikes every 4 s, whether or not the structure is at rest
     let cells = cells.replace("quiet_relative = 0.003", "quiet_relative = 0.9");
-    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../hil-sim/rigs/by-hand.toml");
+    let rig = include_str!("../../../hil-sim/rigs/by-hand.toml");
     let over = |address: &str| {
         let folder = tempfile::tempdir().unwrap();
         let (summary, records) = run(&folder.path().join("c.jrig"), &cells, open(address, 7));
@@ -77,12 +78,19 @@ fn a_bridge_carries_the_same_records() {
         assert_eq!((summary.accounts.unexplained(), summary.accounts.lost), (0, 0), "{:?}", summary.accounts);
         records
     };
-    let direct = over(&format!("sim:{rig}"));
-    for how in ["--block 1000", "--block 5120 --volts"] {
-        let play = binary("JOINTRIG_HIL_SIM_BIN").display().to_string();
-        let bridge = format!(
-            "bridge:{play} play --rig {rig} --seed 7 --hits 2 --visit A/AZ3/A3 --visit AJB/AZ3/A3 --visit AJB/AZ3/B3 {how}"
-        );
-        assert_eq!(over(&bridge), direct, "{how}");
+    let play = binary("JOINTRIG_HIL_SIM_BIN").display().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    for (bits, of) in [(16, SampleType::I16), (24, SampleType::I32)] {
+        let path = folder.path().join(format!("{bits}.toml"));
+        std::fs::write(&path, format!("{rig}\n[sensors]\nbits = {bits}\n")).unwrap();
+        let path = path.display();
+        let direct = over(&format!("sim:{path}"));
+        assert!(direct[0].samples.types().iter().all(|own| *own == of), "{:?}", direct[0].samples.types());
+        for how in ["--block 1000", "--block 5120 --volts"] {
+            let bridge = format!(
+                "bridge:{play} play --rig {path} --seed 7 --hits 2 --visit A/AZ3/A3 --visit AJB/AZ3/A3 --visit AJB/AZ3/B3 {how}"
+            );
+            assert_eq!(over(&bridge), direct, "{bits} bits, {how}");
+        }
     }
 }
