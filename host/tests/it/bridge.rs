@@ -61,7 +61,7 @@ fn sixty_four_channels_at_a_rational_rate() {
     other.channels.iter_mut().for_each(|channel| channel.units_per_volt *= 1.01);
     session.calibrate(&map, &other).unwrap();
 
-    let (_, first) = session.start(map.len()).unwrap();
+    let (_, first) = session.start(&map).unwrap();
     assert_eq!(first, 0, "a source that is held begins with the stream");
     session.wait_for(20_000).unwrap();
     let (samples, gaps) = session.cut(0..20_000).unwrap();

@@ -358,7 +358,7 @@ fn the_example_in_c_is_a_recorder() {
     let map = session.channels(&info).unwrap();
     let names: Vec<&str> = map.channels.iter().map(|channel| channel.name.as_str()).collect();
     assert_eq!((info.board.as_str(), names), ("example in C", vec!["force", "acc"]));
-    session.start(map.len()).unwrap();
+    session.start(&map).unwrap();
     session.wait_for(25_600).unwrap();
     let (samples, gaps) = session.cut(0..25_600).unwrap();
     assert!(gaps.is_empty());

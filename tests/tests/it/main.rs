@@ -5,6 +5,7 @@ mod another_structure;
 mod any_structure;
 mod between_arms_accuracy;
 mod bridge;
+mod bridged_contact;
 mod calibration;
 mod compare;
 mod contact_accuracy;
