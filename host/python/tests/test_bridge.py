@@ -5,8 +5,11 @@ import os
 import struct
 import subprocess
 import sys
+import wave
 from pathlib import Path
 
+import jointrig as jr
+import numpy as np
 import pytest
 from conftest import command
 
@@ -109,3 +112,91 @@ for values in ([[40_000]], np.array([[40_000]], dtype=np.uint16)):
     assert done.returncode == 0, done.stderr
     # the header, and the one block of two scans
     assert len(done.stdout.split(b"\n", 1)[1]) == 24 + 4
+
+
+# a recording of 24 bits at 48 kHz: a mass on a spring, struck every three seconds
+RATE, EVERY, HITS = 48_000, 3 * 48_000, 5
+MASS_KG, AT_HZ, DAMPING = 2.0, 180.0, 0.01
+FULL = (200.0, 500.0)
+
+
+def accelerance(s: np.ndarray) -> np.ndarray:
+    """m/s^2 per N at the complex frequencies s, 1/s."""
+    w = 2 * np.pi * AT_HZ
+    return s**2 / (MASS_KG * (s**2 + 2 * DAMPING * w * s + w**2))
+
+
+def recording(path: Path, bits: int) -> None:
+    """Force and acceleration, with noise of 100 dB below full scale."""
+    rng = np.random.default_rng(3)
+    t = np.arange(EVERY) / RATE
+    # the campaign begins within the first seconds
+    parts = [np.zeros((5 * RATE, 2))]
+    for hit in range(HITS):
+        # a pulse of 2 ms without edges, whose spectrum ends at 1 kHz
+        force = (50 + hit) * np.where(np.abs(t - 0.5) < 1e-3, np.cos(500 * np.pi * (t - 0.5)) ** 2, 0.0)
+        # periodic in 3 s, after which e^-28 of the motion is left
+        line = 2j * np.pi * np.fft.rfftfreq(EVERY, 1 / RATE)
+        parts.append(np.stack([force, np.fft.irfft(accelerance(line) * np.fft.rfft(force), EVERY)], axis=1))
+    share = np.concatenate(parts) / FULL
+    share += 10 ** (-100 / 20) / np.sqrt(2) * rng.standard_normal(share.shape)
+    codes = np.round(share * 2 ** (bits - 1)).astype("<i4")
+    frames = codes.view(np.uint8).reshape(-1, 4)[:, : bits // 8].tobytes()
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(2)
+        file.setsampwidth(bits // 8)
+        file.setframerate(RATE)
+        file.writeframes(frames)
+
+
+def plan(folder: Path) -> Path:
+    """FRFs of one accelerometer at one place, from the template."""
+    path = folder / "plan.toml"
+    command("plan", "new", path, "--template", "frf-only")
+    text = path.read_text()
+    head, rest = text.split("[geometry]")
+    points = [line for line in rest.splitlines() if '"AY1"' not in line and '"AX1"' not in line and '"NB2"' not in line]
+    for old, new in [
+        ("rate_hz = 51200", f"rate_hz = {RATE}"),
+        ("wanted = 5", f"wanted = {HITS}"),
+        ('impacts = ["AZ1", "AY1", "AX1"]', 'impacts = ["AZ1"]'),
+        ('responses = ["NA1", "NB2"]', 'responses = ["NA1"]'),
+    ]:
+        assert old in head, old
+        head = head.replace(old, new)
+    text = head + "[geometry]" + "\n".join(points)
+    text = text.replace('channels = ["na1_x", "na1_y", "na1_z"]', 'axes = [[0, 0, 1]], channels = ["acc_z"]')
+    path.write_text(text + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("bits", "of"), [(16, np.int16), (24, np.int32)])
+def test_a_stereo_recording_gives_the_frf_of_its_structure(tmp_path: Path, bits: int, of: type) -> None:
+    wav, file = tmp_path / "run.wav", tmp_path / "lab.jrig"
+    recording(wav, bits)
+    command("campaign", "new", file, "--plan", plan(tmp_path))
+    device = f"bridge:{sys.executable} -m jointrig.bridge wav {wav} force:N:{FULL[0]}:hammer_force acc_z:m/s^2:{FULL[1]}"
+    command("campaign", "run", "--yes", file, "--device", device)
+    lab = jr.open(file)
+    assert all(record.samples("acc_z").dtype == of for record in lab.records())
+    found = lab.frf("AJB", band_hz=(50.0, 600.0)).to_receptance()
+    s = found.sigma_per_s + 2j * np.pi * found.frequency_hz
+    exact = accelerance(s) / s**2
+    error = np.abs(found.frf[:, 0, 0] / exact - 1)
+    # at the ends of the band noise leads
+    assert np.median(error) < 2e-3 and error.max() < 0.02, (np.median(error), error.max())
+
+
+def test_a_recording_that_is_no_plain_wav_is_refused(tmp_path: Path) -> None:
+    recording(tmp_path / "run.wav", 24)
+    (tmp_path / "text.wav").write_text("no recording")
+
+    def said(name: str, *channels: str) -> str:
+        arguments = [sys.executable, "-m", "jointrig.bridge", "wav", tmp_path / name, *channels]
+        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+        assert done.returncode != 0 and not done.stdout
+        return done.stderr
+
+    assert "has 2 channels of 24 bits: 1 channels" in said("run.wav", "force:N:200")
+    assert "use soundfile" in said("text.wav", "force:N:200")
+    assert "write NAME:UNIT:FULL_SCALE" in said("run.wav", "force:N")

@@ -16,6 +16,7 @@ This module is pure Python and opens no device itself. The format is described i
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import socket
@@ -23,14 +24,25 @@ import struct
 import sys
 import threading
 import time
+import wave
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["Channel", "Source", "from_callable", "from_ldaq", "from_nidaqmx", "from_opendaq", "from_sounddevice"]
+__all__ = [
+    "Channel",
+    "Source",
+    "from_callable",
+    "from_ldaq",
+    "from_nidaqmx",
+    "from_opendaq",
+    "from_sounddevice",
+    "from_wav",
+]
 
 _TYPES = {"i16": np.dtype("<i2"), "i32": np.dtype("<i4"), "f32": np.dtype("<f4"), "f64": np.dtype("<f8")}
 _OVERRUN = 1
@@ -65,7 +77,8 @@ class Channel:
 
     unit: N, kN, lbf, m/s, mm/s, m, mm, um, m/s^2, g, V or mV. With sensitivity_v (V per unit; negative for a reversed
     sensor), samples and full_scale are in V, otherwise in the unit. role: hammer_force, response_x, response_y,
-    response_z, specimen_a, specimen_b, load_cell, excitation or auxiliary. delay_s: how late the samples are.
+    response_z, specimen_a, specimen_b, load_cell, excitation or auxiliary. delay_s: how late the samples are. bits: those of
+    this channel, if they are not the source's.
     """
 
     name: str
@@ -74,14 +87,16 @@ class Channel:
     sensitivity_v: float | None = None
     role: str = "auxiliary"
     delay_s: float = 0.0
+    bits: int | None = None
 
 
 class Source:
     """Writes a recorder's samples to jointrig.
 
     serial must be the same in every run: a campaign is continued only with the recorder that it was begun with.
-    sample: type of the samples, i16, i32 (with the bits of its full scale), f32 or f64. held: the source can wait, as a
-    file or a simulation; a recorder cannot. listen: "HOST:PORT", to wait there for a jointrig on another computer
+    sample: type of the samples, i16, i32, f32 or f64. bits: of a full scale of i32, e.g. 24 for codes of ±2²³ (32 if absent);
+    of f32 and f64, the resolution that is kept, 8 to 30 (24 if absent). held: the source can wait, as a file or a simulation;
+    a recorder cannot. listen: "HOST:PORT", to wait there for a jointrig on another computer
     (`--device bridge:tcp:HOST:PORT`) instead of being started by it.
     """
 
@@ -288,3 +303,63 @@ def from_nidaqmx(task: Any, channels: Sequence[Channel], *, board: str, serial: 
         while out.wanted():
             out.write(np.asarray(task.read(most, timeout=10.0)).reshape(len(channels), -1).T)
     task.stop()
+
+
+def from_wav(path: str | os.PathLike[str], channels: Sequence[Channel], *, serial: str | None = None, **source: Any) -> None:
+    """Writes a recording from a WAV file of 16, 24 or 32 bits, from its beginning to its end, as fast as jointrig measures.
+
+    The largest code is full_scale. serial: the file's name if absent. For other formats: soundfile and from_callable.
+    """
+    try:
+        file = wave.open(os.fspath(path))
+    except wave.Error as error:
+        raise ValueError(f"{path}: {error}; integers are read, for other formats use soundfile and from_callable") from None
+    with file:
+        bits, count, rate_hz = 8 * file.getsampwidth(), file.getnchannels(), file.getframerate()
+        if bits not in (16, 24, 32) or count != len(channels):
+            raise ValueError(f"{path} has {count} channels of {bits} bits: {len(channels)} channels of 16, 24 or 32 are needed")
+        name = Path(path).name.encode()[:24].decode(errors="ignore")
+        sample = "i16" if bits == 16 else "i32"
+        source = {"sample": sample, "bits": bits, "held": True} | source
+        with Source("WAV file", serial=serial or name, rate_hz=rate_hz, channels=channels, **source) as out:
+            while out.wanted() and (frames := file.readframes(max(1, rate_hz // 20))):
+                out.write(_codes(frames, bits).reshape(-1, count))
+
+
+def _codes(frames: bytes, bits: int) -> np.ndarray:
+    if bits != 24:
+        return np.frombuffer(frames, f"<i{bits // 8}")
+    # the three bytes above a byte of zeros, which then shifts out
+    wide = np.zeros((len(frames) // 3, 4), np.uint8)
+    wide[:, 1:] = np.frombuffer(frames, np.uint8).reshape(-1, 3)
+    return wide.view("<i4")[:, 0] >> 8
+
+
+def _stated(text: str) -> Channel:
+    parts = text.split(":")
+    try:
+        name, unit, full_scale, *role = parts
+        return Channel(name, unit, full_scale=float(full_scale), role=role[0] if role else "auxiliary")
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"`{text}`: write NAME:UNIT:FULL_SCALE or NAME:UNIT:FULL_SCALE:ROLE") from None
+
+
+def _main() -> None:
+    parser = argparse.ArgumentParser(
+        "python -m jointrig.bridge", description="Plays a recording as a device: --device \"bridge:python -m jointrig.bridge wav …\"."
+    )
+    wav = parser.add_subparsers(required=True).add_parser("wav", help="a WAV file of 16, 24 or 32 bits")
+    wav.add_argument("file")
+    wav.add_argument(
+        "channels",
+        nargs="+",
+        type=_stated,
+        metavar="NAME:UNIT:FULL_SCALE[:ROLE]",
+        help="one for each channel; full scale is the value of the largest code: force:N:200:hammer_force acc_z:m/s^2:500",
+    )
+    given = parser.parse_args()
+    from_wav(given.file, given.channels)
+
+
+if __name__ == "__main__":
+    _main()
