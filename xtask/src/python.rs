@@ -41,7 +41,7 @@ const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
 /// Packages that are used together with the wheel: those of notebooks, engines that read the
 /// columns, and a scheduler.
-const OTHERS: [&str; 15] = [
+const OTHERS: [&str; 16] = [
     "pytest",
     "pytest-xdist",
     "mypy",
@@ -59,6 +59,8 @@ const OTHERS: [&str; 15] = [
     // recorders for jointrig.bridge, in the versions that it was written for
     "LDAQ==1.3.2",
     "opendaq==3.40.3",
+    // needs PortAudio (on Debian: libportaudio2), without which its test is skipped
+    "sounddevice==0.5.6",
 ];
 
 /// The command that the wheel is compared with.
