@@ -6,6 +6,7 @@ use jointrig::device::address::Address;
 use jointrig::device::error::DeviceError;
 use jointrig::device::samples::ChannelView;
 use jointrig::device::session::Session;
+use jointrig::exchange::units::{Dimension, Unit};
 
 use jointrig_protocol::channel::{Quantity, Role};
 use jointrig_protocol::request::{Control, Fire, Shake};
@@ -95,4 +96,21 @@ fn sixty_four_channels_at_a_rational_rate() {
     };
     assert!(refused(session.shake(shake)));
     assert_eq!(session.finish().unwrap().lost, 0);
+}
+
+/// The bridge has a table of its own, because it does not depend on this crate.
+#[test]
+fn units_mean_the_same_over_the_bridge_and_in_files() {
+    for (label, quantity, si) in jointrig_bridge::header::UNITS {
+        let dimension = match quantity {
+            Quantity::Force => Dimension::FORCE,
+            Quantity::Velocity => Dimension::VELOCITY,
+            Quantity::Displacement => Dimension::DISPLACEMENT,
+            Quantity::Acceleration => Dimension::ACCELERATION,
+            // a voltage is no quantity of a file
+            Quantity::Voltage => continue,
+        };
+        let unit = Unit::parse(label, &[dimension]).unwrap();
+        assert!((unit.factor / si - 1.0).abs() < 1e-15, "{label}: {} and {si}", unit.factor);
+    }
 }
