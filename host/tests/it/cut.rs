@@ -5,6 +5,8 @@ use jointrig::campaign::plan::configuration_name;
 use jointrig::campaign::store::Store;
 use jointrig::campaign::verdict::Verdict;
 use jointrig::device::samples::SampleType;
+use jointrig::exchange::channel_records::{ChannelRecords, write_uff_file};
+use jointrig_protocol::channel::Quantity;
 use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -469,4 +471,163 @@ fn levels_of_a_shaker_are_cut_without_their_transitions() {
     }
     write_named(&folder.join("shaker.npz"), &names, &units, &all, true);
     assert!(refused(folder, &cut, 1).contains("channel `excitation` has no part"));
+}
+
+/// Writes a WAV file of 24 bits, each signal in parts of its full scale.
+fn write_wav(path: &Path, signals: &[Vec<f32>], full_scale: &[f32]) {
+    let spec = hound::WavSpec {
+        channels: signals.len() as u16,
+        sample_rate: FS_HZ as u32,
+        bits_per_sample: 24,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut out = hound::WavWriter::create(path, spec).expect("a file");
+    for scan in 0..signals[0].len() {
+        for (signal, full_scale) in signals.iter().zip(full_scale) {
+            out.write_sample((signal[scan] / full_scale * 8_388_608.0) as i32).expect("written");
+        }
+    }
+    out.finalize().expect("closed");
+}
+
+/// Writes text with volts, 100 N and 0.1 m/s for each.
+fn write_volts(path: &Path, signals: &[Vec<f32>]) {
+    let mut lines = vec!["time (s);ai0 (V);ai1 (V);ai2 (V);ai3 (V);marker (V)".to_owned()];
+    for scan in 0..signals[0].len() {
+        let volts: Vec<String> = signals
+            .iter()
+            .zip([100.0, 0.1, 0.1, 0.1])
+            .map(|(own, per)| (own[scan] / per).to_string())
+            .collect();
+        lines.push(format!("{};{};0", scan as f64 / FS_HZ, volts.join(";")));
+    }
+    std::fs::write(path, lines.join("\n")).expect("written");
+}
+
+fn write_universal(path: &Path, signals: &[Vec<f32>]) {
+    let all = ChannelRecords {
+        fs_hz: FS_HZ,
+        names: ["hammer", "x", "y", "z"].map(String::from).to_vec(),
+        quantities: vec![Quantity::Force, Quantity::Velocity, Quantity::Velocity, Quantity::Velocity],
+        delay_s: vec![vec![0.0; 4]],
+        records: vec![1],
+        signals: vec![signals.iter().map(|own| own.iter().map(|v| f64::from(*v)).collect()).collect()],
+    };
+    write_uff_file(path, &all).expect("written");
+}
+
+#[test]
+fn text_wav_and_universal_files_are_cut_as_npz_with_stated_sensitivities() {
+    let mut person = Person::new(5);
+    for _ in 0..5 {
+        person.good(0);
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let recorded = signals(&person.strikes, 1, person.now_s, 3);
+    std::fs::write(folder.join("plan.toml"), plan(1, 1, 5)).expect("written");
+    let most = recorded[1..].iter().flatten().fold(0.0f32, |most, v| most.max(v.abs()));
+    write_wav(&folder.join("run.wav"), &recorded, &[100.0, 2.0 * most, 2.0 * most, 2.0 * most]);
+    write_volts(&folder.join("run.csv"), &recorded);
+    write_universal(&folder.join("run.uff"), &recorded);
+    write(&folder.join("run.npz"), &recorded, true);
+    let of_wav = ["x", "y", "z"].iter().zip(2..).map(|(axis, n)| format!("{n}={axis}:{} m/s/FS", 2.0 * most));
+    let of_wav = std::iter::once("1=hammer:100 N/FS".to_owned()).chain(of_wav).collect::<Vec<_>>().join(",");
+    let of_text = "ai0=hammer:10 mV/N,ai1=x:100 mm/s/V,ai2=y:100 mm/s/V,ai3=z:100 mm/s/V";
+    let mut peaks = Vec::new();
+    for (name, calibrate, of) in [
+        ("run.npz", "", SampleType::F32),
+        ("run.wav", of_wav.as_str(), SampleType::I32),
+        ("run.csv", of_text, SampleType::F64),
+        ("run.uff", "", SampleType::F32),
+    ] {
+        let campaign = format!("{name}.jrig");
+        done(folder, &["campaign", "new", &campaign, "--plan", "plan.toml"]);
+        let cut = ["import", name, "--into", &campaign, "--cut", "--order", "plan", "--calibrate", calibrate];
+        let told = done(folder, &cut);
+        assert!(told.contains("5 hits, 5 of them good"), "{name}: {told}");
+        assert!(done(folder, &cut).contains("5 were there already"), "{name}");
+        assert_eq!(check(&folder.join(&campaign), &person.strikes, 1), [5, 5], "{name}");
+        let store = Store::open_read_only(&folder.join(&campaign)).expect("a campaign");
+        let row = store.records().expect("records").into_iter().next().expect("a record").expect("undamaged");
+        let map = store.channels(row.session).expect("channels");
+        let samples = store.samples(&row).expect("samples");
+        assert_eq!(samples.types()[0], of, "{name}");
+        let greatest = |place: usize| {
+            map.to_si(place, samples.channel(place)).into_iter().fold(0.0f64, |most, v| most.max(v.abs()))
+        };
+        peaks.push([greatest(0), greatest(1)]);
+    }
+    // scales are kept in single precision, and 24 bits resolve 1e-7 of full scale
+    for own in &peaks {
+        assert!(own.iter().zip(peaks[0]).all(|(one, npz)| (one / npz - 1.0).abs() < 1e-5), "{peaks:?}");
+    }
+    let said =
+        refused(folder, &["import", "run.csv", "--into", "run.npz.jrig", "--cut", "--order", "plan"], 1);
+    assert!(said.contains("no channel is the hammer's force"), "{said}");
+    // cut off by a byte
+    let whole = std::fs::read(folder.join("run.wav")).expect("readable");
+    std::fs::write(folder.join("run.wav"), &whole[..whole.len() - 1]).expect("written");
+    let cut =
+        ["import", "run.wav", "--into", "run.npz.jrig", "--cut", "--order", "plan", "--calibrate", &of_wav];
+    assert!(refused(folder, &cut, 1).contains("not a whole WAV file"));
+}
+
+#[test]
+fn a_marker_names_the_places_and_what_contradicts_it_is_asked() {
+    const RESPONSES: usize = 2;
+    let mut person = Person::new(3);
+    // the third place is skipped
+    for place in [0, 1, 3, 4, 5] {
+        for _ in 0..4 {
+            person.good(place);
+        }
+        person.move_on();
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder.path();
+    let mut recorded = signals(&person.strikes, 6, person.now_s, 8);
+    // 0.2 V for each place, switched two seconds before the hit
+    let marker = |levels: &dyn Fn(usize, &Strike) -> f32| -> Vec<f32> {
+        let mut volts = vec![0.0; recorded[0].len()];
+        for (number, strike) in person.strikes.iter().enumerate() {
+            let from = ((strike.at_s - 2.0) * FS_HZ) as usize;
+            volts[from..].fill(levels(number, strike));
+        }
+        volts
+    };
+    let own = |strike: &Strike| 0.2 * (strike.place.expect("a place") + 1) as f32;
+    let right = marker(&|_, strike| own(strike));
+    let wrong = marker(&|number, strike| match number {
+        4 => 0.2,
+        9 => 0.31,
+        _ => own(strike),
+    });
+    recorded.push(wrong);
+    let (names, units) = (["hammer", "x", "y", "z", "place"], ["N", "m/s", "m/s", "m/s", "V"]);
+    write_named(&folder.join("run.npz"), &names, &units, &recorded, true);
+    std::fs::write(folder.join("plan.toml"), plan(3, RESPONSES, 4)).expect("written");
+    done(folder, &["campaign", "new", "c.jrig", "--plan", "plan.toml"]);
+    let cut = ["import", "run.npz", "--into", "c.jrig", "--cut", "--marker"];
+    let said = refused(folder, &[&cut[..], &["place:0.2"]].concat(), 1);
+    assert!(said.contains("hit 5: the marker says A/H1/S1, and the response is that of A/H1/S2"), "{said}");
+    assert!(said.contains("hit 10: the marker stands at 0.3100"), "{said}");
+    assert!(!said.contains("hit 6:") && said.contains("5,?,?,?") && said.contains("11-12,A,H2,S1"), "{said}");
+    assert_eq!(check(&folder.join("c.jrig"), &person.strikes, RESPONSES), [0, 0]);
+    // the table counts where both name a hit
+    std::fs::write(folder.join("places.csv"), "hit,configuration,impact,response\n5,A,H1,S2\n10,A,H2,S1\n")
+        .expect("written");
+    let told = done(folder, &[&cut[..], &["place:0.2", "--table", "places.csv"]].concat());
+    assert!(told.contains("A/H2/S2: no hits") && told.contains("20 hits, 20 of them good"), "{told}");
+    assert_eq!(check(&folder.join("c.jrig"), &person.strikes, RESPONSES), [20, 20]);
+    assert!(!told.contains("stored without a use"), "{told}");
+    recorded[4] = right;
+    write_named(&folder.join("run.npz"), &names, &units, &recorded, true);
+    done(folder, &["campaign", "new", "d.jrig", "--plan", "plan.toml"]);
+    let cut = ["import", "run.npz", "--into", "d.jrig", "--cut", "--marker"];
+    done(folder, &[&cut[..], &["place:0.2"]].concat());
+    assert_eq!(check(&folder.join("d.jrig"), &person.strikes, RESPONSES), [20, 20]);
+    assert!(
+        refused(folder, &[&cut[..], &["other:0.2"]].concat(), 1).contains("it has hammer, x, y, z, place")
+    );
 }

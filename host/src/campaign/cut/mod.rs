@@ -7,6 +7,7 @@
 //! | how much the structure's answer differs between two hits | [`alike`] |
 //! | which place of the plan each hit was at, or what to ask | [`places`] |
 //! | what the user states about the places | [`stated`] |
+//! | what a marker channel says about them | [`marker`] |
 //! | steady parts of a shaker's recording | [`levels`] |
 //!
 //! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns
@@ -17,6 +18,7 @@
 pub mod alike;
 pub mod hits;
 pub mod levels;
+pub mod marker;
 pub mod places;
 #[cfg(test)]
 mod places_tests;
@@ -42,7 +44,8 @@ use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Judgement, Verdict};
 use crate::device::samples::Samples;
 use crate::device::stream::Recording;
-use crate::exchange::NpzError;
+use crate::exchange::exported::SignalFileError;
+use crate::exchange::{FrfFileError, NpzError};
 
 /// Scans that are read at once.
 const PIECE: u64 = 1 << 18;
@@ -63,6 +66,12 @@ pub enum CutError {
     /// The file cannot be read.
     #[error(transparent)]
     Npz(#[from] NpzError),
+    /// A file of another format cannot be read.
+    #[error(transparent)]
+    File(#[from] SignalFileError),
+    /// A file whose format is not known by its name cannot be read.
+    #[error(transparent)]
+    Unknown(#[from] FrfFileError),
     /// Its content does not allow it.
     #[error("{name}: {what}")]
     Unfit {
@@ -344,17 +353,40 @@ pub fn assign(
     places: &[Place],
     named: &[Option<Named>],
 ) -> Result<Fitted, Unclear> {
-    let evidence: Vec<HitEvidence> = hits
-        .iter()
-        .map(|hit| HitEvidence { at_s: hit.at_s, good: hit.is_good(), answer: hit.answer.clone() })
-        .collect();
+    places::fit(&evidence(hits), &order(plan, places), named)
+}
+
+/// What contradicts the places that a marker names, one sentence for each hit: its number and why.
+/// `marked` has the hits that only the marker names.
+pub fn contradictions(
+    hits: &[CutHit],
+    plan: &Plan,
+    places: &[Place],
+    named: &[Option<Named>],
+    marked: &[bool],
+) -> Vec<(usize, String)> {
+    places::contradictions(&evidence(hits), &order(plan, places), named, marked)
+}
+
+/// The questions about hits whose place a marker leaves open, with the stretches that it names.
+pub fn unclear_marker(hits: &[CutHit], named: &[Option<Named>], open: Vec<(usize, String)>) -> Unclear {
+    let own: Vec<usize> = open.iter().map(|(hit, _)| *hit).collect();
+    let visits = places::stated_visits(&evidence(hits), named, &own);
+    Unclear { visits, questions: open.into_iter().map(|(_, what)| what).collect() }
+}
+
+fn evidence(hits: &[CutHit]) -> Vec<HitEvidence> {
+    let of = |hit: &CutHit| HitEvidence { at_s: hit.at_s, good: hit.is_good(), answer: hit.answer.clone() };
+    hits.iter().map(of).collect()
+}
+
+fn order(plan: &Plan, places: &[Place]) -> PlaceOrder {
     let own = plan.hits.get_ref();
-    let order = PlaceOrder {
+    PlaceOrder {
         names: places.iter().map(|place| place.name.clone()).collect(),
         wanted: own.wanted,
         minimum: own.minimum,
-    };
-    places::fit(&evidence, &order, named)
+    }
 }
 
 /// Longest record of a level, s: more cycles do not make a loop more exact than the sensors are.

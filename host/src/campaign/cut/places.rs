@@ -159,6 +159,66 @@ pub fn fit(hits: &[HitEvidence], order: &PlaceOrder, named: &[Option<Named>]) ->
     Err(Unclear { visits: fit.visits(), questions: fit.questions })
 }
 
+/// What contradicts the places in `named`, of the hits in `marked` that only a marker names: a good
+/// hit whose answer is clearly different from those of the other hits at its place. Each is the
+/// hit's index and a sentence.
+pub fn contradictions(
+    hits: &[HitEvidence],
+    order: &PlaceOrder,
+    named: &[Option<Named>],
+    marked: &[bool],
+) -> Vec<(usize, String)> {
+    let mut fit = Fit::new(hits, order, named);
+    let good = fit.good();
+    // one group for each place, of the hits named there
+    fit.groups = (0..order.names.len())
+        .map(|place| {
+            let here = |hit: &usize| fit.said(*hit) == Some(Named::Place(place));
+            let members = good.iter().copied().filter(here).collect();
+            Group { members, place: Some(place), named: true }
+        })
+        .collect();
+    let doubt = |hit: usize| {
+        let Some(Named::Place(own)) = fit.said(hit).filter(|_| marked.get(hit) == Some(&true)) else {
+            return None;
+        };
+        let away = fit.distance_from(hit, own).filter(|distance| *distance >= fit.limits.other)?;
+        let other = (0..fit.groups.len())
+            .filter(|place| *place != own)
+            .filter_map(|place| Some((place, fit.distance_from(hit, place)?)))
+            .filter(|(_, distance)| *distance <= fit.limits.same && *distance < away)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let names = &order.names;
+        let why = other.map_or_else(
+            || "the response is that of no other hit there".to_owned(),
+            |(place, _)| format!("the response is that of {}", names[place]),
+        );
+        Some((hit, format!("hit {}: the marker says {}, and {why}", hit + 1, names[own])))
+    };
+    good.iter().filter_map(|hit| doubt(*hit)).collect()
+}
+
+/// Consecutive good hits at one place, by what is stated; `open` ones are at no known place.
+pub fn stated_visits(hits: &[HitEvidence], named: &[Option<Named>], open: &[usize]) -> Vec<Visit> {
+    let mut visits: Vec<(Option<Named>, Visit)> = Vec::new();
+    for hit in (0..hits.len()).filter(|hit| hits[*hit].good) {
+        let said = named.get(hit).copied().flatten().filter(|_| !open.contains(&hit));
+        let place = match said {
+            Some(Named::Place(place)) => Some(place),
+            Some(Named::Nowhere) => continue,
+            None => None,
+        };
+        match visits.last_mut() {
+            Some((last, visit)) if *last == said => {
+                visit.hits[1] = hit;
+                visit.good += 1;
+            }
+            _ => visits.push((said, Visit { hits: [hit, hit], good: 1, place })),
+        }
+    }
+    visits.into_iter().map(|(_, visit)| visit).collect()
+}
+
 struct Fit<'f> {
     hits: &'f [HitEvidence],
     order: &'f PlaceOrder,

@@ -1,7 +1,9 @@
 //! A continuous recording: its channels, and any part of its samples as they came.
 //!
-//! An npz file is read where its arrays lie in the file, in pieces; its length is bounded by the
-//! disk only. Forms (numpy.savez, not savez_compressed):
+//! Names, units and sensitivities have the rules of files of single hits
+//! ([`assign`](crate::campaign::import::assign)). Text and universal files are in memory once, with
+//! all their values. A WAV file is read where its samples lie, and so is an npz file, whose length
+//! is bounded by the disk only. Its forms (numpy.savez, not savez_compressed):
 //!
 //! | array | shape | content |
 //! |---|---|---|
@@ -15,16 +17,16 @@
 
 use std::ops::Range;
 use std::path::Path;
-
-use jointrig_protocol::channel::{Channel, Quantity, Role};
+use std::sync::{Mutex, PoisonError};
 
 use super::CutError;
-use crate::campaign::import::assign::{measured_in, volts};
-use crate::campaign::import::roles::role_of;
+use crate::campaign::import::assign::{AssignedRecording, Calibrations, assigned_recording};
+use crate::campaign::import::channel_file::{ChannelFile, FileChannel, WavFile, ending, read_channel_file};
 use crate::campaign::plan::Plan;
 use crate::device::channels::ChannelMap;
 use crate::device::samples::{ChannelSamples, ChannelView, SampleType, Samples};
 use crate::exchange::NpzError;
+use crate::exchange::frf_file::is_npz;
 use crate::exchange::npz::NpzFile;
 use crate::exchange::npz_long::LongArray;
 
@@ -43,10 +45,37 @@ struct Signal {
     step: u64,
 }
 
-/// The source of the samples.
+/// The source of the samples, with all channels of the file.
 enum Source {
     File { arrays: Vec<LongArray>, signals: Vec<Signal> },
+    Wav(Mutex<WavFile>),
     Memory(Samples),
+}
+
+/// The description of a recording's channels, and the types of all channels of its file.
+struct Described {
+    own: AssignedRecording,
+    types: Vec<SampleType>,
+}
+
+impl Described {
+    fn of(
+        name: &str,
+        plan: &Plan,
+        fs_hz: f64,
+        (channels, types): (&[FileChannel], &[SampleType]),
+        stated: &Calibrations,
+    ) -> Result<Self, CutError> {
+        let own = assigned_recording(plan, fs_hz, (channels, types), stated)
+            .map_err(|what| CutError::unfit(name, what))?;
+        Ok(Self { own, types: types.to_vec() })
+    }
+
+    fn recording(self, name: &str, scans: u64, source: Source) -> LongRecording {
+        let AssignedRecording { map, places, unknown } = self.own;
+        let types = places.iter().map(|place| self.types[*place]).collect();
+        LongRecording { name: name.into(), map, scans, types, places, unused: unknown, source }
+    }
 }
 
 /// A continuous recording.
@@ -55,31 +84,67 @@ pub struct LongRecording {
     map: ChannelMap,
     scans: u64,
     types: Vec<SampleType>,
+    /// Place of each channel in the file.
+    places: Vec<usize>,
     unused: Vec<String>,
     source: Source,
 }
 
 impl LongRecording {
-    /// A recording in memory, whose channels are described by `map`.
+    /// A recording in memory: its channels as in a file, each with all its samples.
     ///
     /// # Errors
-    /// The map does not describe the samples.
-    pub fn in_memory(name: &str, map: ChannelMap, samples: Samples) -> Result<Self, CutError> {
-        if map.len() != samples.channels() {
+    /// As [`assigned_recording`], or the channels differ in length.
+    pub fn in_memory(
+        name: &str,
+        plan: &Plan,
+        file: ChannelFile,
+        stated: &Calibrations,
+    ) -> Result<Self, CutError> {
+        let ChannelFile { fs_hz, channels, hits } = file;
+        let count = hits.len();
+        let (Some(samples), true) = (hits.into_iter().next(), count == 1) else {
             return Err(CutError::unfit(
                 name,
-                format!("{} channels are described, and there are {}", map.len(), samples.channels()),
+                format!("it has {count} separate hits and no continuous recording: import it without --cut"),
             ));
+        };
+        let (types, scans) = (samples.types(), samples.scans() as u64);
+        let of = Described::of(name, plan, fs_hz, (&channels, &types), stated)?;
+        Ok(of.recording(name, scans, Source::Memory(samples)))
+    }
+
+    /// Opens a file: npz, WAV, comma-separated text, or a universal file.
+    ///
+    /// # Errors
+    /// It cannot be read, has another form, or its channels cannot be described.
+    pub fn open(path: &Path, plan: &Plan, stated: &Calibrations) -> Result<Self, CutError> {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        match ending(path).as_str() {
+            "wav" => {
+                let wav = WavFile::open(path)?;
+                let types = vec![wav.of; wav.channels.len()];
+                let of = Described::of(&name, plan, wav.fs_hz, (&wav.channels, &types), stated)?;
+                let scans = wav.scans;
+                Ok(of.recording(&name, scans, Source::Wav(Mutex::new(wav))))
+            }
+            "csv" | "txt" | "uff" | "unv" | "uf" => {
+                Self::in_memory(&name, plan, read_channel_file(path)?, stated)
+            }
+            _ if is_npz(path)? => Self::open_npz(path, plan, stated),
+            _ => Err(CutError::unfit(
+                &name,
+                "a continuous recording is read from .npz (numpy.savez, uncompressed), .wav, .csv or .uff; Python's lab.cut(…) takes \
+                 arrays of any other format (docs/recipes.md)",
+            )),
         }
-        let (scans, types) = (samples.scans() as u64, samples.types());
-        Ok(Self { name: name.into(), map, scans, types, unused: Vec::new(), source: Source::Memory(samples) })
     }
 
     /// Opens an npz file.
     ///
     /// # Errors
     /// It is damaged, has other arrays than those above, or a unit is unknown.
-    pub fn open_npz(path: &Path, plan: &Plan) -> Result<Self, CutError> {
+    fn open_npz(path: &Path, plan: &Plan, stated: &Calibrations) -> Result<Self, CutError> {
         let mut npz = NpzFile::open(path)?;
         let fs_hz = npz.number("fs", "scans per second, Hz")?;
         if !(1.0..=f64::from(u32::MAX)).contains(&fs_hz) {
@@ -114,12 +179,12 @@ impl LongRecording {
         let bits = of_channels("bits", "bits of each channel's converter")?;
         let delays = of_channels("delay_s", "delay of each channel, s")?;
         let types: Vec<SampleType> = signals.iter().map(|signal| type_of(&arrays[signal.array])).collect();
-        let (mut channels, mut unused) = (Vec::with_capacity(names.len()), Vec::new());
+        let mut channels = Vec::with_capacity(names.len());
         for (place, (name, unit)) in names.iter().zip(&units).enumerate() {
             let wrong = |what: String| npz.content(format!("channel `{name}`: {what}"));
-            let (quantity, factor) = quantity_of(unit).map_err(wrong)?;
             let range = full_scales.as_ref().map_or(0.0, |all| all[place]);
-            if types[place].is_code() && range <= 0.0 {
+            let is_code = types[place].is_code();
+            if is_code && range <= 0.0 {
                 return Err(wrong(
                     "its samples are integers, and their scale is not known: add an array `full_scale` with the value \
                      of the largest code (2^15 or 2^31), in the channel's unit"
@@ -128,30 +193,19 @@ impl LongRecording {
                 .into());
             }
             let own_bits = bits.as_ref().map_or(types[place].bytes() as f64 * 8.0, |all| all[place]);
-            let delay_s = delays.as_ref().map_or(0.0, |all| all[place]);
-            if !(0.0..1.0).contains(&delay_s) || !(1.0..=32.0).contains(&own_bits) {
-                return Err(wrong("`delay_s` must be 0 to 1 s, and `bits` 1 to 32".into()).into());
+            if !(1.0..=32.0).contains(&own_bits) {
+                return Err(wrong("`bits` must be 1 to 32".into()).into());
             }
-            let is_code = types[place].is_code();
-            let role = role_of(plan, "", name, quantity);
-            if role.is_none() {
-                unused.push(name.clone());
-            }
-            channels.push(Channel {
-                name: name.as_str().try_into().map_err(|_| wrong("the name is too long".into()))?,
-                role: role.unwrap_or(Role::Auxiliary),
-                quantity,
-                units_per_volt: factor as f32,
-                range_v: if is_code { range as f32 } else { 0.0 },
-                delay_ns: (1e9 * delay_s).round() as u32,
+            channels.push(FileChannel {
+                full_scale: is_code.then_some(range),
                 bits: if is_code { own_bits as u8 } else { 0 },
+                delay_s: delays.as_ref().map_or(0.0, |all| all[place]),
+                ..FileChannel::new(name, Some(unit))
             });
         }
-        let rate_hz = fs_hz.round();
-        let exact_hz = (rate_hz != fs_hz).then_some(fs_hz);
-        let map = ChannelMap { id: 0, rate_hz: rate_hz as u32, exact_hz, channels };
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, map, scans, types, unused, source: Source::File { arrays, signals } })
+        let of = Described::of(&name, plan, fs_hz, (&channels, &types), stated)?;
+        Ok(of.recording(&name, scans, Source::File { arrays, signals }))
     }
 
     /// Its name, for messages.
@@ -195,19 +249,26 @@ impl LongRecording {
         let samples = match &self.source {
             Source::Memory(all) => {
                 let part = |place: &usize| {
-                    let view = all.channel(*place).part(range.start as usize, range.end as usize);
+                    let view =
+                        all.channel(self.places[*place]).part(range.start as usize, range.end as usize);
                     let mut own = ChannelSamples::empty(view.of());
                     append(&mut own, view);
                     own
                 };
                 channels.iter().map(part).collect()
             }
+            Source::Wav(wav) => {
+                let own: Vec<usize> = channels.iter().map(|place| self.places[*place]).collect();
+                // a panic of another thread leaves nothing that the next seek would not set
+                let mut wav = wav.lock().unwrap_or_else(PoisonError::into_inner);
+                wav.part(&own, range)?
+            }
             Source::File { arrays, signals } => {
                 let mut samples: Vec<ChannelSamples> =
                     channels.iter().map(|place| ChannelSamples::empty(self.types[*place])).collect();
                 let mut bytes = Vec::new();
                 for (own, place) in samples.iter_mut().zip(channels) {
-                    let signal = &signals[*place];
+                    let signal = &signals[self.places[*place]];
                     let array = &arrays[signal.array];
                     let most = (PIECE / signal.step as usize).max(1);
                     let mut done = 0;
@@ -333,15 +394,5 @@ fn append(own: &mut ChannelSamples, more: ChannelView<'_>) {
         (ChannelSamples::F32(own), ChannelView::F32(more)) => own.extend_from_slice(more),
         (ChannelSamples::F64(own), ChannelView::F64(more)) => own.extend_from_slice(more),
         _ => {}
-    }
-}
-
-/// The quantity of a unit, and its factor to SI.
-fn quantity_of(label: &str) -> Result<(Quantity, f64), String> {
-    match volts(label) {
-        Some(factor) => Ok((Quantity::Voltage, factor)),
-        None => measured_in(label).map_err(|what| {
-            format!("its unit `{label}`: {what}; write N, m/s, mm/s, m/s^2, g, m, µm or another unit of force or motion")
-        }),
     }
 }

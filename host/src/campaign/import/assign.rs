@@ -143,6 +143,8 @@ struct Kept {
     channel: Channel,
     /// Factor of floating-point values before they are stored; 1 leaves the samples as they came.
     factor: f64,
+    /// Whether neither the plan nor the usual names know its name.
+    unknown: bool,
 }
 
 /// The channels of a file as those of hits at `response`, and the samples of each hit in that
@@ -159,34 +161,59 @@ pub fn assigned(
     file: &ChannelFile,
     stated: &Calibrations,
 ) -> Result<(ChannelMap, Vec<Samples>), String> {
-    for own in &stated.0 {
-        if !file.channels.iter().any(|channel| same_name(&channel.name, &own.channel)) {
-            let there: Vec<&str> = file.channels.iter().map(|channel| channel.name.as_str()).collect();
-            return Err(format!(
-                "there is no channel `{}`, for which --calibrate states a sensor: it has {}",
-                own.channel,
-                there.join(", ")
-            ));
-        }
-    }
     let types = file.hits.first().map(Samples::types).unwrap_or_default();
-    let mut kept = Vec::new();
-    for (place, channel) in file.channels.iter().enumerate() {
-        let of = types.get(place).copied().unwrap_or_default();
-        if let Some(own) = described(plan, response, channel, of, stated)? {
-            kept.push(Kept { place, ..own });
-        }
-    }
-    let rate_hz = file.fs_hz.round();
-    let exact_hz = (rate_hz != file.fs_hz).then_some(file.fs_hz);
-    let channels = kept.iter().map(|own| own.channel.clone()).collect();
-    let map = ChannelMap { id: 0, rate_hz: rate_hz as u32, exact_hz, channels };
+    let of = Described { plan, response, keeps_unknown: false };
+    let kept = of.all(&file.channels, &types, stated)?;
+    let map = map_of(file.fs_hz, kept.iter().map(|own| own.channel.clone()).collect());
     let hit = |samples: &Samples| {
         let own = kept.iter().map(|kept| of_channel(samples.channel(kept.place), kept.factor)).collect();
         Samples::new(own).ok_or_else(|| "its channels differ in length".to_owned())
     };
     let hits = file.hits.iter().map(hit).collect::<Result<Vec<_>, _>>()?;
     Ok((map, hits))
+}
+
+/// The map of channels that are sampled at `fs_hz`.
+fn map_of(fs_hz: f64, channels: Vec<Channel>) -> ChannelMap {
+    let rate_hz = fs_hz.round();
+    let exact_hz = (rate_hz != fs_hz).then_some(fs_hz);
+    ChannelMap { id: 0, rate_hz: rate_hz as u32, exact_hz, channels }
+}
+
+/// The channels of a continuous recording.
+pub struct AssignedRecording {
+    /// Those that are kept.
+    pub map: ChannelMap,
+    /// Place of each of them in the file.
+    pub places: Vec<usize>,
+    /// Names of those that neither the plan nor the usual names know; they are auxiliary.
+    pub unknown: Vec<String>,
+}
+
+/// As [`assigned`], for a continuous recording of `types`, whose samples all stay as they came:
+/// factors to SI units are in the channels' scales. A name that is not known is kept as an
+/// auxiliary channel (a marker, a tachometer), and so are its volts without a sensitivity.
+///
+/// # Errors
+/// As [`assigned`].
+pub fn assigned_recording(
+    plan: &Plan,
+    fs_hz: f64,
+    (channels, types): (&[FileChannel], &[SampleType]),
+    stated: &Calibrations,
+) -> Result<AssignedRecording, String> {
+    // hits of one recording may be at any location
+    let of = Described { plan, response: "", keeps_unknown: true };
+    let kept = of.all(channels, types, stated)?;
+    let places = kept.iter().map(|own| own.place).collect();
+    let unknown = kept.iter().filter(|own| own.unknown).map(|own| own.channel.name.to_string()).collect();
+    let in_scale = |own: Kept| Channel {
+        units_per_volt: (f64::from(own.channel.units_per_volt) * own.factor) as f32,
+        range_v: (f64::from(own.channel.range_v) / own.factor) as f32,
+        ..own.channel
+    };
+    let map = map_of(fs_hz, kept.into_iter().map(in_scale).collect());
+    Ok(AssignedRecording { map, places, unknown })
 }
 
 /// The samples of a channel; values times a factor are in double precision.
@@ -204,94 +231,147 @@ fn of_channel(samples: ChannelView<'_>, factor: f64) -> ChannelSamples {
     }
 }
 
-/// A channel with its role and scale; `None` for one that is left out.
-fn described(
-    plan: &Plan,
-    response: &str,
-    channel: &FileChannel,
-    of: SampleType,
-    stated: &Calibrations,
-) -> Result<Option<Kept>, String> {
-    let FileChannel { name: in_file, unit, full_scale, bits, delay_s } = channel;
-    let own = stated.0.iter().find(|own| same_name(&own.channel, in_file));
-    let name = match own {
-        Some(Stated { name: None, .. }) => return Ok(None),
-        Some(Stated { name: Some(name), .. }) => name,
-        None => in_file,
-    };
-    // records find the channels of fixed sensors by the plan's spelling
-    let mut fixed =
-        plan.geometry.response.iter().filter_map(|point| point.get_ref().channels.as_ref()).flatten();
-    let name = fixed.find(|own| same_name(own, name)).unwrap_or(name);
-    let remedy = format!(
-        "state its sensor with --calibrate '{in_file}=NAME:SENSITIVITY', e.g. '{in_file}=hammer:2.25 mV/N'"
-    );
-    let label = unit.as_deref();
-    let planned =
-        plan.channel.iter().map(toml::Spanned::get_ref).find(|sensor| same_name(&sensor.name, name));
-    let volts = match (label.map(|label| (label, volts(label))), own.and_then(|own| own.scale)) {
-        // without a unit, a stated sensitivity says that the values are volts
-        (None, Some(_)) => Some(1.0),
-        (Some((_, volts)), _) => volts,
-        (None, None) => {
-            return Err(format!(
-                "channel `{in_file}` has no unit: write it into the heading, `{in_file} (mm/s)`, or {remedy}"
-            ));
+/// How the channels of a file are described.
+#[derive(Clone, Copy)]
+struct Described<'p> {
+    plan: &'p Plan,
+    response: &'p str,
+    /// Whether a channel whose name is not known is kept as an auxiliary one, instead of refused.
+    keeps_unknown: bool,
+}
+
+impl Described<'_> {
+    /// The channels that are kept.
+    fn all(
+        &self,
+        channels: &[FileChannel],
+        types: &[SampleType],
+        stated: &Calibrations,
+    ) -> Result<Vec<Kept>, String> {
+        for own in &stated.0 {
+            if !channels.iter().any(|channel| same_name(&channel.name, &own.channel)) {
+                let there: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+                return Err(format!(
+                    "there is no channel `{}`, for which --calibrate states a sensor: it has {}",
+                    own.channel,
+                    there.join(", ")
+                ));
+            }
         }
-    };
-    let (quantity, units_per_volt, factor, delay_s) = match (volts, own.and_then(|own| own.scale)) {
-        (Some(volts), Some(scale)) => (scale.quantity, scale.per_volt, volts, *delay_s),
-        (Some(volts), None) => {
-            let (quantity, per_volt, late) = from_plan(name, planned)
+        let mut kept = Vec::new();
+        for (place, channel) in channels.iter().enumerate() {
+            let of = types.get(place).copied().unwrap_or_default();
+            if let Some(own) = self.one(channel, of, stated)? {
+                kept.push(Kept { place, ..own });
+            }
+        }
+        Ok(kept)
+    }
+
+    /// A channel with its role and scale; `None` for one that is left out.
+    fn one(
+        &self,
+        channel: &FileChannel,
+        of: SampleType,
+        stated: &Calibrations,
+    ) -> Result<Option<Kept>, String> {
+        let Self { plan, response, keeps_unknown } = *self;
+        let FileChannel { name: in_file, unit, full_scale, bits, delay_s } = channel;
+        let own = stated.0.iter().find(|own| same_name(&own.channel, in_file));
+        let name = match own {
+            Some(Stated { name: None, .. }) => return Ok(None),
+            Some(Stated { name: Some(name), .. }) => name,
+            None => in_file,
+        };
+        // records find the channels of fixed sensors by the plan's spelling
+        let mut fixed =
+            plan.geometry.response.iter().filter_map(|point| point.get_ref().channels.as_ref()).flatten();
+        let name = fixed.find(|own| same_name(own, name)).unwrap_or(name);
+        let remedy = format!(
+            "state its sensor with --calibrate '{in_file}=NAME:SENSITIVITY', e.g. '{in_file}=hammer:2.25 mV/N'"
+        );
+        let label = unit.as_deref();
+        let planned =
+            plan.channel.iter().map(toml::Spanned::get_ref).find(|sensor| same_name(&sensor.name, name));
+        let volts = match (label.map(|label| (label, volts(label))), own.and_then(|own| own.scale)) {
+            // without a unit, a stated sensitivity says that the values are volts
+            (None, Some(_)) => Some(1.0),
+            (Some((_, volts)), _) => volts,
+            (None, None) => {
+                return Err(format!(
+                    "channel `{in_file}` has no unit: write it into the heading, `{in_file} (mm/s)`, or {remedy}"
+                ));
+            }
+        };
+        let (quantity, units_per_volt, factor, delay_s) = match (volts, own.and_then(|own| own.scale)) {
+            (Some(volts), Some(scale)) => (scale.quantity, scale.per_volt, volts, *delay_s),
+            (Some(volts), None) if keeps_unknown && planned.is_none() && !is_used(plan, name) => {
+                (Quantity::Voltage, 1.0, volts, *delay_s)
+            }
+            (Some(volts), None) => {
+                let (quantity, per_volt, late) = from_plan(name, planned)
                 .ok_or_else(|| format!("channel `{in_file}` is in {}, and its sensitivity is not known: {remedy}, or give the plan a [[channel]] with the name of a force cell or vibrometer and its sensitivity_v", label.unwrap_or("V")))?;
-            (quantity, per_volt, volts, late.unwrap_or(*delay_s))
-        }
-        (None, Some(_)) => {
-            return Err(format!(
-                "channel `{in_file}` is in {}, not in volts: leave its sensitivity out of --calibrate",
-                label.unwrap_or_default()
-            ));
-        }
-        (None, None) => {
-            let label = label.unwrap_or_default();
-            let (quantity, factor) = measured_in(label).map_err(|what| {
-                format!("channel `{in_file}`: its unit `{label}`: {what}; correct it, or {remedy}")
-            })?;
-            (quantity, 1.0, factor, *delay_s)
-        }
-    };
-    // of codes the full scale is converted, and the samples stay as they came
-    let (range_v, factor) = match (of.is_code(), full_scale) {
-        (true, None) => {
-            return Err(format!("channel `{in_file}` has codes whose full scale is not known: {remedy}"));
-        }
-        (true, Some(full_scale)) => (full_scale * factor, 1.0),
-        (false, full_scale) => (full_scale.unwrap_or(0.0) * factor, factor),
-    };
-    let role = role_of(plan, response, name, quantity).ok_or_else(|| {
+                (quantity, per_volt, volts, late.unwrap_or(*delay_s))
+            }
+            (None, Some(_)) => {
+                return Err(format!(
+                    "channel `{in_file}` is in {}, not in volts: leave its sensitivity out of --calibrate",
+                    label.unwrap_or_default()
+                ));
+            }
+            (None, None) => {
+                let label = label.unwrap_or_default();
+                let (quantity, factor) = measured_in(label).map_err(|what| {
+                    format!("channel `{in_file}`: its unit `{label}`: {what}; correct it, or {remedy}")
+                })?;
+                (quantity, 1.0, factor, *delay_s)
+            }
+        };
+        // of codes the full scale is converted, and the samples stay as they came
+        let (range_v, factor) = match (of.is_code(), full_scale) {
+            (true, None) => {
+                return Err(format!("channel `{in_file}` has codes whose full scale is not known: {remedy}"));
+            }
+            (true, Some(full_scale)) => (full_scale * factor, 1.0),
+            (false, full_scale) => (full_scale.unwrap_or(0.0) * factor, factor),
+        };
+        let role = role_of(plan, response, name, quantity);
+        let unknown = role.is_none();
+        let role = role.or(keeps_unknown.then_some(Role::Auxiliary)).ok_or_else(|| {
         format!(
             "channel `{in_file}` ({}) is not known as `{name}`: names are hammer, x, y, z, LDV_A, LDV_B, LC1, excitation, and the \
              channels of the plan's fixed sensors. Rename it, or give --calibrate '{in_file}=NAME', or '{in_file}=-' to leave it out",
             quantity.unit()
         )
     })?;
-    if !(0.0..1.0).contains(&delay_s) {
-        return Err(format!("channel `{in_file}`: its delay of {delay_s} s must be 0 to 1 s"));
+        if !(0.0..1.0).contains(&delay_s) {
+            return Err(format!("channel `{in_file}`: its delay of {delay_s} s must be 0 to 1 s"));
+        }
+        Ok(Some(Kept {
+            place: 0,
+            channel: Channel {
+                name: name
+                    .parse()
+                    .map_err(|_| format!("the name `{name}` is too long: 24 letters at most"))?,
+                role,
+                quantity,
+                // a negative full scale is a reversed sensor
+                units_per_volt: (units_per_volt * if range_v < 0.0 { -1.0 } else { 1.0 }) as f32,
+                range_v: range_v.abs() as f32,
+                delay_ns: (1e9 * delay_s).round() as u32,
+                bits: *bits,
+            },
+            factor,
+            unknown,
+        }))
     }
-    Ok(Some(Kept {
-        place: 0,
-        channel: Channel {
-            name: name.parse().map_err(|_| format!("the name `{name}` is too long: 24 letters at most"))?,
-            role,
-            quantity,
-            // a negative full scale is a reversed sensor
-            units_per_volt: (units_per_volt * if range_v < 0.0 { -1.0 } else { 1.0 }) as f32,
-            range_v: range_v.abs() as f32,
-            delay_ns: (1e9 * delay_s).round() as u32,
-            bits: *bits,
-        },
-        factor,
-    }))
+}
+
+/// Whether an analysis would use a channel of this name if its quantity were known.
+fn is_used(plan: &Plan, name: &str) -> bool {
+    [Quantity::Force, Quantity::Velocity]
+        .into_iter()
+        .any(|quantity| role_of(plan, "", name, quantity).is_some())
 }
 
 /// Quantity, units per volt and delay of a channel whose sensor the plan describes. The plan does

@@ -2,20 +2,29 @@
 //! comma-separated text with a heading, WAV, universal files, npz. Names and units are as the file
 //! states them; [`assign`](super::assign) finds what each channel is.
 
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use hound::{SampleFormat, WavReader};
 
-use crate::device::samples::{ChannelSamples, Samples};
+use crate::device::samples::{ChannelSamples, SampleType, Samples};
 use crate::exchange::delimiter;
 use crate::exchange::exported::SignalFileError;
 use crate::exchange::frf_uff::contents;
 use crate::exchange::npz::NpzFile;
-use crate::exchange::uff::{Abscissa, Function, Values, kind, quantity};
+use crate::exchange::uff::{Abscissa, DataSet, Function, Values, kind, quantity};
 use crate::untrusted_input;
 
-/// Largest text or WAV file, bytes: it is read as a whole.
+/// Largest text file, bytes: its values are kept in memory.
 const MOST: u64 = 2 << 30;
+
+/// Relative resolution of times in single precision.
+const SINGLE: f64 = 1.2e-7;
+
+/// The heading of a text file lies within this many bytes.
+const HEADING: usize = 1 << 16;
 
 /// A channel as its file describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +42,8 @@ pub struct FileChannel {
 }
 
 impl FileChannel {
-    fn new(name: &str, unit: Option<&str>) -> Self {
+    /// A channel of values, without delay.
+    pub fn new(name: &str, unit: Option<&str>) -> Self {
         let unit = unit.map(str::trim).filter(|unit| !unit.is_empty()).map(str::to_owned);
         Self { name: name.trim().into(), unit, full_scale: None, bits: 0, delay_s: 0.0 }
     }
@@ -57,7 +67,8 @@ fn wrong(path: &Path, what: impl Into<String>) -> SignalFileError {
 /// Unit of a WAV file's samples: the recorder's full scale.
 pub const FULL_SCALE: &str = "FS";
 
-fn ending(path: &Path) -> String {
+/// The ending of a file's name, in lower case.
+pub fn ending(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
@@ -171,43 +182,119 @@ fn of_npz(path: &Path) -> Result<ChannelFile, SignalFileError> {
 
 /// One hit; names are the channels' numbers from 1, values are parts of the recorder's full scale.
 fn of_wav(path: &Path) -> Result<ChannelFile, SignalFileError> {
-    let bytes = untrusted_input::bytes(path, MOST)
-        .map_err(|source| SignalFileError::Open { path: path.into(), source })?;
-    let failed = |error: hound::Error| wrong(path, format!("it is not a whole WAV file ({error})"));
-    let mut reader = WavReader::new(&bytes[..]).map_err(failed)?;
-    let spec = reader.spec();
-    let count = usize::from(spec.channels);
-    let bits = u8::try_from(spec.bits_per_sample).unwrap_or(0);
-    let (samples, bits): (Vec<ChannelSamples>, u8) = match (spec.sample_format, spec.bits_per_sample) {
-        (SampleFormat::Float, _) => {
-            let all = reader.samples::<f32>().collect::<Result<Vec<f32>, _>>().map_err(failed)?;
-            let of = |channel: usize| all.iter().skip(channel).step_by(count).copied().collect();
-            ((0..count).map(|channel| ChannelSamples::F32(of(channel))).collect(), 0)
+    let mut wav = WavFile::open(path)?;
+    let all: Vec<usize> = (0..wav.channels.len()).collect();
+    let read = wav.part(&all, 0..wav.scans)?;
+    let hit = Samples::new(read).ok_or_else(|| wrong(path, "it ends within a scan: record it again"))?;
+    Ok(ChannelFile { fs_hz: wav.fs_hz, channels: wav.channels, hits: vec![hit] })
+}
+
+/// A WAV file, whose samples are read where they lie in it.
+pub struct WavFile {
+    path: PathBuf,
+    reader: WavReader<BufReader<File>>,
+    /// Sampling rate, Hz.
+    pub fs_hz: f64,
+    /// The channels: their numbers from 1, in parts of the recorder's full scale.
+    pub channels: Vec<FileChannel>,
+    /// Type of all samples.
+    pub of: SampleType,
+    /// Number of scans.
+    pub scans: u64,
+}
+
+impl WavFile {
+    /// Opens a file, and reads its last scan, so that one that was cut short is refused.
+    ///
+    /// # Errors
+    /// It cannot be read, is cut short, or has samples of other than 16 to 32 bits.
+    pub fn open(path: &Path) -> Result<Self, SignalFileError> {
+        let (file, _) = untrusted_input::open(path)
+            .map_err(|source| SignalFileError::Open { path: path.into(), source })?;
+        let reader = WavReader::new(BufReader::new(file)).map_err(|error| not_whole(path, &error))?;
+        let spec = reader.spec();
+        let bits = u8::try_from(spec.bits_per_sample).unwrap_or(0);
+        let (of, bits) = match (spec.sample_format, spec.bits_per_sample) {
+            (SampleFormat::Float, _) => (SampleType::F32, 0),
+            (SampleFormat::Int, 16) => (SampleType::I16, bits),
+            (SampleFormat::Int, 17..=32) => (SampleType::I32, bits),
+            (_, bits) => {
+                return Err(wrong(
+                    path,
+                    format!("samples of {bits} bits are not read: record 16, 24 or 32 bits"),
+                ));
+            }
+        };
+        if spec.channels == 0 || reader.len() % u32::from(spec.channels) != 0 {
+            return Err(wrong(path, "it ends within a scan: record it again"));
         }
-        (SampleFormat::Int, 16) => {
-            let all = reader.samples::<i16>().collect::<Result<Vec<i16>, _>>().map_err(failed)?;
-            let of = |channel: usize| all.iter().skip(channel).step_by(count).copied().collect();
-            ((0..count).map(|channel| ChannelSamples::I16(of(channel))).collect(), bits)
+        let channel = |number: u16| FileChannel {
+            full_scale: Some(1.0),
+            bits,
+            ..FileChannel::new(&number.to_string(), Some(FULL_SCALE))
+        };
+        let mut own = Self {
+            path: path.into(),
+            fs_hz: f64::from(spec.sample_rate),
+            channels: (1..=spec.channels).map(channel).collect(),
+            of,
+            scans: u64::from(reader.duration()),
+            reader,
+        };
+        own.part(&[0], own.scans.saturating_sub(1)..own.scans)?;
+        Ok(own)
+    }
+
+    /// The samples of these channels in a range of scans.
+    ///
+    /// # Errors
+    /// The file cannot be read, or ends before.
+    pub fn part(
+        &mut self,
+        channels: &[usize],
+        range: Range<u64>,
+    ) -> Result<Vec<ChannelSamples>, SignalFileError> {
+        let failed = |path: &Path, error: hound::Error| not_whole(path, &error);
+        // a WAV file has fewer than 2^32 samples
+        let from = u32::try_from(range.start).unwrap_or(u32::MAX);
+        self.reader.seek(from).map_err(|error| failed(&self.path, error.into()))?;
+        let (count, scans) = (self.channels.len(), (range.end - range.start) as usize);
+        let read = match self.of {
+            SampleType::I16 => parted(&mut self.reader, count, scans, channels)
+                .map(|all| all.into_iter().map(ChannelSamples::I16).collect()),
+            SampleType::I32 => parted(&mut self.reader, count, scans, channels)
+                .map(|all| all.into_iter().map(ChannelSamples::I32).collect()),
+            SampleType::F32 | SampleType::F64 => parted(&mut self.reader, count, scans, channels)
+                .map(|all| all.into_iter().map(ChannelSamples::F32).collect()),
+        };
+        read.map_err(|error| failed(&self.path, error))
+    }
+}
+
+fn not_whole(path: &Path, error: &hound::Error) -> SignalFileError {
+    wrong(path, format!("it is not a whole WAV file ({error})"))
+}
+
+/// The samples of some of `count` channels that alternate, in the next `scans` scans.
+fn parted<S: hound::Sample + Copy>(
+    reader: &mut WavReader<BufReader<File>>,
+    count: usize,
+    scans: usize,
+    channels: &[usize],
+) -> Result<Vec<Vec<S>>, hound::Error> {
+    let mut own: Vec<Vec<S>> = channels.iter().map(|_| Vec::with_capacity(scans)).collect();
+    let mut scan = Vec::with_capacity(count);
+    let mut samples = reader.samples::<S>();
+    for _ in 0..scans {
+        scan.clear();
+        for sample in samples.by_ref().take(count) {
+            scan.push(sample?);
         }
-        (SampleFormat::Int, 17..=32) => {
-            let all = reader.samples::<i32>().collect::<Result<Vec<i32>, _>>().map_err(failed)?;
-            let of = |channel: usize| all.iter().skip(channel).step_by(count).copied().collect();
-            ((0..count).map(|channel| ChannelSamples::I32(of(channel))).collect(), bits)
+        for (own, channel) in own.iter_mut().zip(channels) {
+            own.push(*scan.get(*channel).ok_or(hound::Error::UnfinishedSample)?);
         }
-        (_, bits) => {
-            return Err(wrong(
-                path,
-                format!("samples of {bits} bits are not read: record 16, 24 or 32 bits"),
-            ));
-        }
-    };
-    let channels = (1..=count).map(|number| FileChannel {
-        full_scale: Some(1.0),
-        bits,
-        ..FileChannel::new(&number.to_string(), Some(FULL_SCALE))
-    });
-    let hit = Samples::new(samples).ok_or_else(|| wrong(path, "it ends within a scan: record it again"))?;
-    Ok(ChannelFile { fs_hz: f64::from(spec.sample_rate), channels: channels.collect(), hits: vec![hit] })
+    }
+    Ok(own)
 }
 
 /// Time responses. A hit has one of each channel: the next hit begins where a channel comes again.
@@ -219,23 +306,35 @@ fn of_uff(path: &Path) -> Result<ChannelFile, SignalFileError> {
     let mut channels: Vec<FileChannel> = Vec::new();
     let mut hits: Vec<Vec<Option<Vec<f64>>>> = Vec::new();
     let mut step = None;
-    for function in contents.functions().filter(|function| function.kind == kind::TIME) {
-        let Values::Real(own) = &function.values else { continue };
-        let Abscissa::Even { step: own_step, .. } = function.abscissa else {
-            return Err(wrong(path, "its samples are not evenly spaced: resample it"));
+    for set in contents.sets {
+        let DataSet::Function(mut function) = set else { continue };
+        if function.kind != kind::TIME {
+            continue;
+        }
+        // taken, so that a long recording is in memory once
+        let Values::Real(mut own) = std::mem::replace(&mut function.values, Values::Real(Vec::new())) else {
+            continue;
+        };
+        let own_step = match &function.abscissa {
+            Abscissa::Even { step, .. } => *step,
+            // the header prints a step with six digits, so that long signals list their times
+            Abscissa::Uneven(times) => {
+                let last = times.iter().fold(0.0f64, |most, t| most.max(t.abs()));
+                1.0 / rate_of(times, SINGLE * last).map_err(|what| wrong(path, what))?
+            }
         };
         if step.is_some_and(|step: f64| (own_step / step - 1.0).abs() > 1e-6) {
             return Err(wrong(path, "its channels differ in sampling rate: resample them"));
         }
         step = step.or(Some(own_step));
-        let name = name_of(function).ok_or_else(|| {
+        let name = name_of(&function).ok_or_else(|| {
             wrong(
                 path,
                 "a time response names neither entity nor node: write the channel's name as its entity",
             )
         })?;
         let place = channels.iter().position(|channel| channel.name == name).unwrap_or_else(|| {
-            channels.push(FileChannel::new(&name, unit_of(function).as_deref()));
+            channels.push(FileChannel::new(&name, unit_of(&function).as_deref()));
             channels.len() - 1
         });
         if hits.last().is_none_or(|hit| hit.get(place).is_some_and(Option::is_some)) {
@@ -245,7 +344,12 @@ fn of_uff(path: &Path) -> Result<ChannelFile, SignalFileError> {
             hit.resize(hit.len().max(place + 1), None);
             // a hammer pushes whichever way its label points
             let turned = function.response.direction < 0 && function.response != function.reference;
-            hit[place] = Some(if turned { own.iter().map(|value| -value).collect() } else { own.clone() });
+            if turned {
+                for value in &mut own {
+                    *value = -*value;
+                }
+            }
+            hit[place] = Some(own);
         }
     }
     let step = step.ok_or_else(|| wrong(path, "it holds no time response"))?;
@@ -309,11 +413,19 @@ fn unit_of(function: &Function) -> Option<String> {
 /// Columns under a heading `NAME (UNIT)`: a column of time, one of each channel, and possibly one
 /// with the number of the hit; or what jointrig exports.
 fn of_text(path: &Path) -> Result<ChannelFile, SignalFileError> {
-    let opened = untrusted_input::text(path, MOST);
-    let text = opened.map_err(|source| SignalFileError::Open { path: path.into(), source })?;
-    let between = delimiter(&text);
-    let mut reader =
-        csv::ReaderBuilder::new().delimiter(between).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let opened = |source| SignalFileError::Open { path: path.into(), source };
+    let (file, size) = untrusted_input::open(path).map_err(opened)?;
+    if size > MOST {
+        let (own, most) = (untrusted_input::megabytes(size), untrusted_input::megabytes(MOST));
+        return Err(wrong(
+            path,
+            format!("it has {own}, and text of at most {most} is read: write it as npz"),
+        ));
+    }
+    // read as a stream, so that only the values are in memory
+    let mut text = BufReader::with_capacity(HEADING, file.take(size));
+    let between = delimiter(&String::from_utf8_lossy(text.fill_buf().map_err(opened)?));
+    let mut reader = csv::ReaderBuilder::new().delimiter(between).trim(csv::Trim::All).from_reader(text);
     let failed = |error: csv::Error| wrong(path, format!("{error}"));
     let heading = reader.headers().map_err(failed)?.clone();
     let columns: Vec<(String, Option<String>)> = heading.iter().map(name_and_unit).collect();
@@ -456,10 +568,7 @@ mod tests {
         let read = read_channel_file(&path).expect("readable");
         assert_eq!((read.fs_hz, read.hits.len()), (10_000.0, 1));
         assert_eq!(read.channels[1].unit.as_deref(), Some("mm/s"));
-        assert_eq!(
-            read.hits[0].types(),
-            [crate::device::samples::SampleType::F64, crate::device::samples::SampleType::F32]
-        );
+        assert_eq!(read.hits[0].types(), [SampleType::F64, SampleType::F32]);
         let path = folder.path().join("hit.wav");
         let spec = hound::WavSpec {
             channels: 2,

@@ -5,11 +5,14 @@ use std::path::Path;
 use super::bad;
 use super::records::{length_notice, origin_of};
 use crate::campaign::cut::levels::SteadyCriteria;
+use crate::campaign::cut::marker::{self, Marker};
 use crate::campaign::cut::places::{Fitted, Named, Unclear};
 use crate::campaign::cut::recording::LongRecording;
 use crate::campaign::cut::{
-    CutError, CutHit, Only, Place, assign, cut_hit, cut_level, find_hits, find_levels, places_of, stated,
+    CutError, CutHit, Only, Place, assign, contradictions, cut_hit, cut_level, find_hits, find_levels,
+    places_of, stated, unclear_marker,
 };
+use crate::campaign::import::assign::Calibrations;
 use crate::campaign::import::{CellName, Hit, NewLevelRecord, Origin, add_hits, add_level};
 use crate::campaign::plan::level::{Held, Moment};
 use crate::campaign::plan::{Plan, configuration_name};
@@ -17,7 +20,6 @@ use crate::campaign::store::Store;
 use crate::campaign::verdict::{Judgement, Verdict};
 use crate::cli::error::CliError;
 use crate::cli::output::{self, Waiting};
-use crate::exchange::frf_file;
 use crate::untrusted_input;
 use crate::untrusted_text::tell_line;
 
@@ -33,9 +35,13 @@ pub(super) struct Recorded<'r> {
     pub(super) in_order: bool,
     /// The table that names places.
     pub(super) table: Option<&'r Path>,
+    /// The channel that says which place is struck.
+    pub(super) marker: Option<&'r Marker>,
     /// Whether hits are listed and not stored.
     pub(super) dry_run: bool,
     pub(super) replace: bool,
+    /// Sensitivities of recorded voltages.
+    pub(super) calibrate: &'r Calibrations,
     /// The steady parts of a shaker's recording are wanted, measured before or after the cells.
     pub(super) levels: Option<Moment>,
 }
@@ -47,8 +53,10 @@ impl From<CutError> for CliError {
 }
 
 /// The channels that no analysis will use.
-fn unused(recording: &LongRecording) -> Option<String> {
-    let names = recording.unused();
+fn unused(recording: &LongRecording, marker: Option<&Marker>) -> Option<String> {
+    let is_marker = |name: &str| marker.is_some_and(|marker| marker.is(name));
+    let names: Vec<&str> =
+        recording.unused().iter().map(String::as_str).filter(|name| !is_marker(name)).collect();
     (!names.is_empty()).then(|| {
         format!(
             "  stored without a use: {}; names that are used are hammer, x, y, z, LDV_A, LDV_B, LC1 …, excitation, and the \
@@ -73,21 +81,9 @@ fn numbers(hits: &[usize]) -> String {
     ranges.iter().map(text).collect::<Vec<_>>().join(", ")
 }
 
-/// Opens the recording.
-fn open(file: &Path, plan: &Plan) -> Result<LongRecording, CliError> {
-    if frf_file::is_npz(file).map_err(bad)? {
-        return Ok(LongRecording::open_npz(file, plan)?);
-    }
-    Err(bad(format!(
-        "{}: a continuous recording is read from npz, uncompressed: in Python numpy.savez(\"run.npz\", fs=51200, names=[…], \
-         units=[…], signals=array of (channel, sample))",
-        file.display()
-    )))
-}
-
 /// Imports the steady parts of a shaker's recording as levels.
 fn levels(from: &Recorded<'_>, mut store: Store, plan: &Plan, moment: Moment) -> Result<(), CliError> {
-    let recording = open(from.file, plan)?;
+    let recording = LongRecording::open(from.file, plan, from.calibrate)?;
     let waiting = Waiting::of("reading the recording, percent");
     let found = find_levels(&recording, plan, SteadyCriteria::default(), &mut |done, all| {
         waiting.at((100 * done / all.max(1)) as usize, 100);
@@ -102,7 +98,7 @@ fn levels(from: &Recorded<'_>, mut store: Store, plan: &Plan, moment: Moment) ->
         100.0 * SteadyCriteria::default().tolerance,
         SteadyCriteria::default().least_s
     )];
-    lines.extend(unused(&recording));
+    lines.extend(unused(&recording, None));
     for level in &found {
         lines.push(format!(
             "  {:.2} to {:.2} s: {} (reached {}), {}",
@@ -150,21 +146,26 @@ pub(super) fn import(from: &Recorded<'_>) -> Result<(), CliError> {
         return levels(from, store, &plan, moment);
     }
     let places = places_of(&plan, &from.only).map_err(CliError::Usage)?;
-    if !from.in_order && from.table.is_none() && places.len() > 1 {
+    if !from.in_order && from.table.is_none() && from.marker.is_none() && places.len() > 1 {
         return Err(CliError::Usage(format!(
-            "the hits may be at {} places: add --order plan if they were struck in the plan's order, --table TABLE.csv with the columns \
+            "the hits may be at {} places: add --order plan if they were struck in the plan's order, --marker CHANNEL:STEP if a channel \
+             says which, --table TABLE.csv with the columns \
              hit (or time_s), configuration, impact, response, or --configuration, --impact and --response",
             places.len()
         )));
     }
-    let recording = open(file, &plan)?;
+    let recording = LongRecording::open(file, &plan, from.calibrate)?;
     let waiting = Waiting::of("reading the recording, percent");
     let hits = find_hits(&recording, &plan, &mut |done, all| {
         waiting.at((100 * done / all.max(1)) as usize, 100);
     })?;
     drop(waiting);
-    let named = named(from, &plan, &places, &hits)?;
-    let found = found(&recording, &hits);
+    let found = found(&recording, &hits, from.marker);
+    let Stated { named, marked, doubts } = stated(from, &plan, &places, (&recording, &hits))?;
+    let open = [doubts, contradictions(&hits, &plan, &places, &named, &marked)].concat();
+    if !open.is_empty() {
+        return Err(asked(from, &places, &hits, found, &unclear_marker(&hits, &named, open)));
+    }
     let fitted = match assign(&hits, &plan, &places, &named) {
         Ok(fitted) => fitted,
         Err(unclear) => return Err(asked(from, &places, &hits, found, &unclear)),
@@ -225,15 +226,25 @@ pub(super) fn import(from: &Recorded<'_>) -> Result<(), CliError> {
     output::lines(lines)
 }
 
-/// What the user states of each hit.
-fn named(
+/// What is stated about the hits.
+struct Stated {
+    /// The place of each hit.
+    named: Vec<Option<Named>>,
+    /// Whether only the marker names it.
+    marked: Vec<bool>,
+    /// Good hits whose place the marker leaves open: their indices, and why.
+    doubts: Vec<(usize, String)>,
+}
+
+/// What table and marker state of each hit; the table counts where both do.
+fn stated(
     from: &Recorded<'_>,
     plan: &Plan,
     places: &[Place],
-    hits: &[CutHit],
-) -> Result<Vec<Option<Named>>, CliError> {
+    (recording, hits): (&LongRecording, &[CutHit]),
+) -> Result<Stated, CliError> {
     let mut named = match from.table {
-        None if !from.in_order => vec![Some(Named::Place(0)); hits.len()],
+        None if !from.in_order && from.marker.is_none() => vec![Some(Named::Place(0)); hits.len()],
         None => vec![None; hits.len()],
         Some(table) => {
             let text = untrusted_input::text(table, untrusted_input::TABLE).map_err(|source| {
@@ -244,17 +255,27 @@ fn named(
                 .map_err(|what| bad(format!("{}: {what}", table.display())))?
         }
     };
+    let (mut marked, mut doubts) = (vec![false; hits.len()], Vec::new());
+    if let Some(marker) = from.marker {
+        let read = marker::read(recording, marker, hits, places)?;
+        let open = |(hit, _): &(usize, String)| named[*hit].is_none() && hits[*hit].is_good();
+        doubts = read.doubts.into_iter().filter(open).collect();
+        for ((own, marked), said) in named.iter_mut().zip(&mut marked).zip(read.named) {
+            *marked = own.is_none();
+            *own = own.or(said);
+        }
+    }
     if !from.in_order {
-        // without an order, a hit that the table does not name is at no place
+        // without an order, a hit that neither table nor marker names is at no place
         for one in &mut named {
             *one = one.or(Some(Named::Nowhere));
         }
     }
-    Ok(named)
+    Ok(Stated { named, marked, doubts })
 }
 
 /// What was found in the recording, before any fit.
-fn found(recording: &LongRecording, hits: &[CutHit]) -> Vec<String> {
+fn found(recording: &LongRecording, hits: &[CutHit], marker: Option<&Marker>) -> Vec<String> {
     let counts: Vec<String> = Verdict::ALL
         .into_iter()
         .filter_map(|kind| {
@@ -271,7 +292,7 @@ fn found(recording: &LongRecording, hits: &[CutHit]) -> Vec<String> {
         hits.len(),
         counts.join(", ")
     )];
-    lines.extend(unused(recording));
+    lines.extend(unused(recording, marker));
     for (number, hit) in hits.iter().enumerate() {
         let why = match (&hit.incomplete, &hit.verdict) {
             (Some(why), _) => format!("left out: {why}"),

@@ -17,6 +17,7 @@ use super::output;
 use crate::analyse;
 use crate::campaign::archive::restore::is_archive;
 use crate::campaign::cut::Only;
+use crate::campaign::cut::marker::Marker;
 use crate::campaign::import::CellName;
 use crate::campaign::import::assign::Calibrations;
 use crate::campaign::plan::level::Moment;
@@ -55,7 +56,8 @@ use names::Pattern;
 /// content. The import adds to existing data; what is already present is not stored again, so the
 /// command may be repeated.
 ///
-/// A continuous recording (npz with all channels) is cut with --cut: its hits are found, judged and
+/// A continuous recording (npz, wav, csv or universal file with all channels; --calibrate as above) is
+/// cut with --cut: its hits are found, judged and
 /// fitted to the plan's order (--order plan) by the structure's response, or to a table (--table).
 /// What was found is printed before it is stored; where a place is not certain, nothing is stored, and
 /// the message lists what to state.
@@ -110,9 +112,13 @@ pub struct Import {
     /// response.
     #[arg(long, value_name = "TABLE.csv", requires = "cut")]
     table: Option<PathBuf>,
+    /// Continuous recording: the channel whose level is STEP times the number of the place that is
+    /// struck, in the plan's order from 1 (0: no place), such as ai7:0.5.
+    #[arg(long, value_name = "CHANNEL:STEP", requires = "cut", conflicts_with = "order")]
+    marker: Option<Marker>,
     /// Continuous recording of the shaker: store its steady parts as levels, measured before or
     /// after the cells.
-    #[arg(long, value_name = "before|after", requires = "cut", conflicts_with_all = ["order", "table"])]
+    #[arg(long, value_name = "before|after", requires = "cut", conflicts_with_all = ["order", "table", "marker"])]
     levels: Option<Moment>,
     /// Continuous recording: tell what was found, and store nothing.
     #[arg(long, requires = "cut")]
@@ -146,8 +152,10 @@ impl Import {
                 },
                 in_order: self.order == Some(CutOrder::Plan),
                 table: self.table.as_deref(),
+                marker: self.marker.as_ref(),
                 dry_run: self.dry_run,
                 replace,
+                calibrate: &self.calibrate,
                 levels: self.levels,
             }),
             (None, Some(into), None, None, None)
