@@ -1,5 +1,5 @@
-//! The friction rig: 24 degrees of freedom (30 with a clamp on side B), a hammer, a shaker and ten
-//! or more channels.
+//! The friction rig: 24 degrees of freedom (30 with a clamp on side B, more where bodies bend), a
+//! hammer, a shaker and ten or more channels.
 //!
 //! Axes: x lateral, y vertical (normal load), z horizontal (sliding); origin at the contact's
 //! centre; SI units. One [`Rig`] is one device. It advances by whole scans: [`Rig::scan`] advances
@@ -36,6 +36,7 @@ pub use structure::exact_frf;
 pub use truth::JointState;
 pub use truth::Truth;
 
+mod beam;
 pub(crate) mod channels;
 pub mod config;
 mod configuration;

@@ -1,17 +1,21 @@
-//! The structure: rigid bodies joined by bushings, as M, C and K.
+//! The structure: bodies joined by bushings, as M, C and K.
 //!
-//! A body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r − cg),
-//! that is D = [I, −skew(r − cg); 0, I]. A bushing between two bodies adds Dᵀ diag(k) D to K and Dᵀ
-//! diag(β k) D to C with D = [−D₁, D₂]; ground is a zero row. Six degrees of freedom per body: 18
-//! in A, 6 in B, 24 in AJB. With a rigid clamp A the specimen is lumped onto arm A: six fewer in A
-//! and AJB. With a compliant clamp B, specimen B is a separate body: six more in B and AJB. Arm B's
-//! values include its specimen, so that a very stiff clamp B is equivalent to a rigid one. A rig
-//! with a user-defined structure has the bodies and springs that it lists.
+//! A rigid body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r −
+//! cg), that is D = [I, −skew(r − cg); 0, I]. A body that bends ([`super::beam`]) also has elastic
+//! modes, of which D then has further columns. A bushing between two bodies adds Dᵀ diag(k) D to K
+//! and Dᵀ diag(β k) D to C with D = [−D₁, D₂]; ground is a zero row. Rigid bodies have six degrees
+//! of freedom: 18 in A, 6 in B, 24 in AJB. With a rigid clamp A the specimen is lumped onto arm A:
+//! six fewer in A and AJB. With a compliant clamp B, specimen B is a separate body: six more in B
+//! and AJB. Arm B's values include its specimen, so that a very stiff clamp B is equivalent to a
+//! rigid one. A specimen that bends and whose clamp is rigid is held by its arm at the clamp: there
+//! both sections move as one, and only its elastic modes are coordinates. A rig with a user-defined
+//! structure has the bodies and springs that it lists.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX};
 use num_complex::Complex;
 
-use super::config::{BodyName, Bushing, OwnStructure, RigConfig, RigidBody};
+use super::beam::{Shapes, rigid_motion};
+use super::config::{Beam, BodyName, Bushing, Clamp, OwnStructure, RigConfig, RigidBody};
 use super::normalized;
 use super::{Configuration, Probe, Quantity, RigError};
 
@@ -19,9 +23,9 @@ use super::{Configuration, Probe, Quantity, RigError};
 #[derive(Debug, Clone)]
 pub struct Structure {
     configuration: Configuration,
-    bodies: Vec<(BodyName, [f64; 3])>,
-    /// Whether the clamps of A and B are rigid: their specimens are then not separate bodies.
-    rigid: [bool; 2],
+    bodies: Vec<Body>,
+    /// Whether the specimens of A and B are part of their arms.
+    lumped: [bool; 2],
     /// Mass (kg, kg m²), symmetric positive definite, n × n.
     pub mass: DMatrix<f64>,
     /// Damping (N s/m, N m s/rad), n × n.
@@ -39,18 +43,22 @@ impl Structure {
         }
     }
 
+    /// Whether a body of it bends.
+    pub fn bends(&self) -> bool {
+        self.bodies.iter().any(|body| body.elastic.is_some())
+    }
+
     /// A user-defined structure of any bodies and springs.
     fn of_its_own(config: &RigConfig, own: &OwnStructure, configuration: Configuration) -> Self {
         let bodies: Vec<_> = own.bodies.iter().filter(|body| config.has(configuration, body.name)).collect();
-        let mut structure = Self::empty(
-            configuration,
-            bodies.iter().map(|body| (body.name, body.cg_m)).collect(),
-            // nothing is lumped onto another body
-            [false, false],
-        );
-        for (index, body) in bodies.iter().enumerate() {
-            let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
-            block.copy_from(&body_mass(&body.rigid()));
+        let there = bodies.iter().map(|body| {
+            let rigid = body.rigid();
+            Body::new(body.name, rigid.cg_m).bending(rigid.beam.as_ref(), rigid.mass_kg, &[])
+        });
+        // nothing is lumped onto another body
+        let mut structure = Self::empty(configuration, there.collect(), [false, false]);
+        for body in bodies {
+            structure.carry(body.name, &body_mass(&body.rigid()));
         }
         for spring in own.springs.iter().filter(|spring| spring.present.contains(&configuration)) {
             let ends = spring.ends();
@@ -72,74 +80,91 @@ impl Structure {
         structure
     }
 
-    /// Bodies without mass, by name and centre, not connected.
-    pub(super) fn empty(
-        configuration: Configuration,
-        bodies: Vec<(BodyName, [f64; 3])>,
-        rigid: [bool; 2],
-    ) -> Self {
-        let n = 6 * bodies.len();
+    /// Bodies without mass except that of elastic modes, with the stiffness of these modes, not
+    /// connected.
+    pub(super) fn empty(configuration: Configuration, mut bodies: Vec<Body>, lumped: [bool; 2]) -> Self {
+        let mut n = 0;
+        for body in &mut bodies {
+            body.at = n;
+            n += body.coordinates();
+        }
         let zeros = || DMatrix::zeros(n, n);
-        Self { configuration, bodies, rigid, mass: zeros(), damping: zeros(), stiffness: zeros() }
+        let (mut mass, mut damping, mut stiffness) = (zeros(), zeros(), zeros());
+        for body in &bodies {
+            let Some(elastic) = &body.elastic else { continue };
+            for (mode, square) in elastic.squares.iter().enumerate() {
+                let at = body.modes_at() + mode;
+                mass[(at, at)] = 1.0;
+                stiffness[(at, at)] = *square;
+                damping[(at, at)] = elastic.damping_s * square;
+            }
+        }
+        Self { configuration, bodies, lumped, mass, damping, stiffness }
     }
 
     /// The paper's chain of bodies.
     fn of_the_paper(config: &RigConfig, configuration: Configuration) -> Self {
         let bodies = &config.bodies;
-        let rigid = [config.clamp.rigid, config.clamp_b.rigid];
-        let lumped = |name| match name {
-            BodyName::SpecimenA => rigid[0],
-            BodyName::SpecimenB => rigid[1],
-            _ => false,
+        let lumped = config.lumped();
+        let mut arm_b_kg = bodies.arm_b.mass_kg;
+        if !lumped[1] {
+            arm_b_kg -= bodies.specimen_b.mass_kg;
+        }
+        let all = [
+            (BodyName::Mass, &bodies.mass, bodies.mass.mass_kg),
+            (BodyName::ArmA, &bodies.arm_a, bodies.arm_a.mass_kg),
+            (BodyName::SpecimenA, &bodies.specimen_a, bodies.specimen_a.mass_kg),
+            (BodyName::ArmB, &bodies.arm_b, arm_b_kg),
+            (BodyName::SpecimenB, &bodies.specimen_b, bodies.specimen_b.mass_kg),
+        ];
+        let present: Vec<_> = all
+            .into_iter()
+            .filter(|(name, ..)| {
+                configuration.has(*name)
+                    && !(*name == BodyName::SpecimenA && lumped[0])
+                    && !(*name == BodyName::SpecimenB && lumped[1])
+            })
+            .collect();
+        let body = |(name, body, mass_kg): &(BodyName, &RigidBody, f64)| {
+            Body::new(*name, body.cg_m).of_the_paper(config, configuration, body.beam.as_ref(), *mass_kg)
         };
-        let present: Vec<(BodyName, &RigidBody)> = [
-            (BodyName::Mass, &bodies.mass),
-            (BodyName::ArmA, &bodies.arm_a),
-            (BodyName::SpecimenA, &bodies.specimen_a),
-            (BodyName::ArmB, &bodies.arm_b),
-            (BodyName::SpecimenB, &bodies.specimen_b),
-        ]
-        .into_iter()
-        .filter(|(name, _)| configuration.has(*name) && !lumped(*name))
-        .collect();
-        let there = present.iter().map(|(name, body)| (*name, body.cg_m)).collect();
-        let mut structure = Self::empty(configuration, there, rigid);
-        for (index, (_, body)) in present.iter().enumerate() {
-            let mut block = structure.mass.fixed_view_mut::<6, 6>(6 * index, 6 * index);
-            block.copy_from(&body_mass(body));
+        let there = present.iter().map(body).collect();
+        let mut structure = Self::empty(configuration, there, lumped);
+        for (name, body, _) in &present {
+            let mut mass = body_mass(body);
+            if *name == BodyName::ArmB && !lumped[1] {
+                let specimen = &bodies.specimen_b;
+                let lever = rigid_motion(specimen.cg_m, body.cg_m);
+                mass += lever.transpose() * body_mass(specimen) * lever * -1.0;
+            }
+            structure.carry(*name, &mass);
         }
-        if rigid[0] {
-            structure.add_inertia(BodyName::ArmA, &bodies.specimen_a, 1.0);
-        }
-        if !rigid[1] {
-            structure.add_inertia(BodyName::ArmB, &bodies.specimen_b, -1.0);
+        if lumped[0]
+            && let Some(lever) = structure.motion(BodyName::ArmA, bodies.specimen_a.cg_m)
+        {
+            structure.mass += lever.transpose() * body_mass(&bodies.specimen_a) * lever;
         }
         structure.support(config);
         structure.carry_sensors(config);
         structure
     }
 
+    /// Adds the mass of `body` about its centre of gravity, as far as it moves rigidly.
+    fn carry(&mut self, body: BodyName, mass: &Matrix6<f64>) {
+        if let Some(rigid) = self.find(body).map(|body| self.rigid(body)) {
+            self.mass += rigid.transpose() * mass * rigid;
+        }
+    }
+
     /// Adds the masses of the fixed sensors, as points, to the bodies that are present.
     fn carry_sensors(&mut self, config: &RigConfig) {
         for own in config.sensors.fixed.iter().filter(|own| own.mass_kg > 0.0) {
             let point = config.responses.iter().find(|point| point.name == own.response);
-            let Some((point, (at, cg))) = point.and_then(|point| Some((point, self.find(point.body)?)))
-            else {
-                continue;
-            };
-            let moved = rigid_motion(point.position_m, cg);
-            let moved = moved.fixed_rows::<3>(0);
-            let mut block = self.mass.fixed_view_mut::<6, 6>(at, at);
-            block += moved.transpose() * moved * own.mass_kg;
-        }
-    }
-
-    /// Adds `sign` times the inertia of `part` to `body`, if it is present, as if they were one.
-    fn add_inertia(&mut self, body: BodyName, part: &RigidBody, sign: f64) {
-        if let Some((at, cg)) = self.find(body) {
-            let lever = rigid_motion(part.cg_m, cg);
-            let mut block = self.mass.fixed_view_mut::<6, 6>(at, at);
-            block += lever.transpose() * body_mass(part) * lever * sign;
+            let moved = point.and_then(|point| self.motion(point.body, point.position_m));
+            if let Some(moved) = moved {
+                let moved = moved.rows(0, 3);
+                self.mass += moved.transpose() * moved * own.mass_kg;
+            }
         }
     }
 
@@ -157,7 +182,7 @@ impl Structure {
                 }
             }
             if !config.clamp.rigid {
-                let clamp = if in_a { &config.clamp.free } else { &config.clamp.loaded };
+                let clamp = clamp_of(&config.clamp, configuration);
                 self.connect(Some(BodyName::ArmA), Some(BodyName::SpecimenA), clamp);
             }
         }
@@ -167,8 +192,7 @@ impl Structure {
         }
         if configuration != Configuration::A {
             if !config.clamp_b.rigid {
-                let alone = configuration == Configuration::B;
-                let clamp = if alone { &config.clamp_b.free } else { &config.clamp_b.loaded };
+                let clamp = clamp_of(&config.clamp_b, configuration);
                 self.connect(Some(BodyName::ArmB), Some(BodyName::SpecimenB), clamp);
             }
             for cell in &config.load_cells {
@@ -188,14 +212,54 @@ impl Structure {
         self.configuration
     }
 
-    fn find(&self, body: BodyName) -> Option<(usize, [f64; 3])> {
+    fn find(&self, body: BodyName) -> Option<&Body> {
         let body = match body {
-            BodyName::SpecimenA if self.rigid[0] => BodyName::ArmA,
-            BodyName::SpecimenB if self.rigid[1] => BodyName::ArmB,
+            BodyName::SpecimenA if self.lumped[0] => BodyName::ArmA,
+            BodyName::SpecimenB if self.lumped[1] => BodyName::ArmB,
             other => other,
         };
-        let index = self.bodies.iter().position(|(name, _)| *name == body)?;
-        Some((6 * index, self.bodies[index].1))
+        self.bodies.iter().find(|it| it.name == body)
+    }
+
+    /// Motion of a body's material at `position_m` (translation, rotation), 6 × n; `None` if the
+    /// body is not present.
+    fn motion(&self, body: BodyName, position_m: [f64; 3]) -> Option<Matrix6xX<f64>> {
+        let body = self.find(body)?;
+        let mut motion = match body.held {
+            None => {
+                let mut motion = Matrix6xX::zeros(self.order());
+                motion.fixed_view_mut::<6, 6>(0, body.at).copy_from(&rigid_motion(position_m, body.cg));
+                motion
+            }
+            Some((by, held_m)) => rigid_motion(position_m, held_m) * self.held_motion(by, held_m),
+        };
+        if let Some(elastic) = &body.elastic {
+            let mut shapes = elastic.at(position_m);
+            if let Some((_, held_m)) = body.held {
+                shapes -= rigid_motion(position_m, held_m) * elastic.at(held_m);
+            }
+            motion.view_mut((0, body.modes_at()), (6, elastic.modes())).copy_from(&shapes);
+        }
+        Some(motion)
+    }
+
+    /// Motion of what holds a body; zero if it is not present and counts as ground.
+    fn held_motion(&self, by: BodyName, held_m: [f64; 3]) -> Matrix6xX<f64> {
+        self.motion(by, held_m).unwrap_or_else(|| Matrix6xX::zeros(self.order()))
+    }
+
+    /// Rigid part of a body's motion at its centre of gravity, 6 × n.
+    fn rigid(&self, body: &Body) -> Matrix6xX<f64> {
+        let Some((by, held_m)) = body.held else {
+            let mut rigid = Matrix6xX::zeros(self.order());
+            rigid.fixed_view_mut::<6, 6>(0, body.at).fill_with_identity();
+            return rigid;
+        };
+        let mut motion = self.held_motion(by, held_m);
+        if let Some(elastic) = &body.elastic {
+            motion.view_mut((0, body.modes_at()), (6, elastic.modes())).copy_from(&-elastic.at(held_m));
+        }
+        rigid_motion(body.cg, held_m) * motion
     }
 
     fn connect(&mut self, from: Option<BodyName>, to: Option<BodyName>, bushing: &Bushing) {
@@ -210,11 +274,10 @@ impl Structure {
         bushing: &Bushing,
         axes: Option<[[f64; 3]; 3]>,
     ) {
-        let mut relative = DMatrix::zeros(6, self.order());
+        let mut relative = Matrix6xX::zeros(self.order());
         for (body, sign) in [(from, -1.0), (to, 1.0)] {
-            if let Some((at, cg)) = body.and_then(|body| self.find(body)) {
-                let mut block = relative.fixed_view_mut::<6, 6>(0, at);
-                block += sign * turned(axes) * rigid_motion(bushing.position_m, cg);
+            if let Some(motion) = body.and_then(|body| self.motion(body, bushing.position_m)) {
+                relative += turned(axes) * motion * sign;
             }
         }
         let [kx, ky, kz] = bushing.stiffness_n_per_m;
@@ -231,13 +294,9 @@ impl Structure {
     /// Row of generalised coordinates (length n) of a probe, as output or input; `None` if its body
     /// is not present.
     pub fn row(&self, probe: &Probe) -> Option<DVector<f64>> {
-        let (at, cg) = self.find(probe.body)?;
-        let motion = rigid_motion(probe.position_m, cg);
-        let mut row = DVector::zeros(self.order());
-        for column in 0..6 {
-            row[at + column] = (0..3).map(|axis| probe.direction[axis] * motion[(axis, column)]).sum();
-        }
-        Some(row)
+        let motion = self.motion(probe.body, probe.position_m)?;
+        let row = |column: usize| (0..3).map(|axis| probe.direction[axis] * motion[(axis, column)]).sum();
+        Some(DVector::from_fn(self.order(), |column, _| row(column)))
     }
 
     /// Exact FRF at the complex frequency `s` (1/s): rows · (s²M + sC + K)⁻¹ · columns, times s for
@@ -291,6 +350,64 @@ impl Structure {
     }
 }
 
+/// A body of a structure.
+#[derive(Debug, Clone)]
+pub(super) struct Body {
+    name: BodyName,
+    cg: [f64; 3],
+    /// Its first coordinate: six of rigid motion unless it is held, then one for each mode.
+    at: usize,
+    elastic: Option<Shapes>,
+    /// The body that holds it rigidly, and where.
+    held: Option<(BodyName, [f64; 3])>,
+}
+
+impl Body {
+    /// A rigid body whose six coordinates are its motion at `cg`.
+    pub(super) fn new(name: BodyName, cg: [f64; 3]) -> Self {
+        Self { name, cg, at: 0, elastic: None, held: None }
+    }
+
+    /// The same as a beam of this mass, if one is given, with nodes at the points `loaded`.
+    pub(super) fn bending(self, beam: Option<&Beam>, mass_kg: f64, loaded: &[[f64; 3]]) -> Self {
+        Self { elastic: beam.and_then(|beam| Shapes::new(beam, mass_kg, loaded)), ..self }
+    }
+
+    /// The same for a body of the paper's rig. A specimen has nodes at its clamp and at the
+    /// contact, and is held by its arm if the clamp is rigid.
+    pub(super) fn of_the_paper(
+        self,
+        config: &RigConfig,
+        configuration: Configuration,
+        beam: Option<&Beam>,
+        mass_kg: f64,
+    ) -> Self {
+        let (arm, clamp) = match self.name {
+            BodyName::SpecimenA => (BodyName::ArmA, &config.clamp),
+            BodyName::SpecimenB => (BodyName::ArmB, &config.clamp_b),
+            _ => return self.bending(beam, mass_kg, &[]),
+        };
+        let clamp_m = clamp_of(clamp, configuration).position_m;
+        let bending = self.bending(beam, mass_kg, &[clamp_m, config.contact.position_m]);
+        Self { held: clamp.rigid.then_some((arm, clamp_m)), ..bending }
+    }
+
+    fn coordinates(&self) -> usize {
+        let modes = self.elastic.as_ref().map_or(0, Shapes::modes);
+        if self.held.is_some() { modes } else { 6 + modes }
+    }
+
+    fn modes_at(&self) -> usize {
+        if self.held.is_some() { self.at } else { self.at + 6 }
+    }
+}
+
+/// The bushing of a clamp in `configuration`: with the normal load in the assembly, without it in A
+/// or B alone.
+fn clamp_of(clamp: &Clamp, configuration: Configuration) -> &Bushing {
+    if configuration == Configuration::Ajb { &clamp.loaded } else { &clamp.free }
+}
+
 /// Exact FRFs of `configuration` at each complex frequency of `s` (1/s): one (outputs, inputs)
 /// matrix per frequency.
 ///
@@ -309,15 +426,6 @@ pub fn exact_frf(
 ) -> Result<Vec<DMatrix<Complex<f64>>>, RigError> {
     let structure = Structure::new(config, configuration);
     s.iter().map(|s| structure.frf(*s, quantity, outputs, inputs)).collect()
-}
-
-/// Motion of point `at` (translation, rotation) from that of the body's centre of gravity.
-fn rigid_motion(at: [f64; 3], cg: [f64; 3]) -> Matrix6<f64> {
-    let r = [at[0] - cg[0], at[1] - cg[1], at[2] - cg[2]];
-    let skew = Matrix3::new(0.0, -r[2], r[1], r[2], 0.0, -r[0], -r[1], r[0], 0.0);
-    let mut motion = Matrix6::identity();
-    motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew);
-    motion
 }
 
 /// Rotates translations and rotations into these axes.

@@ -1,10 +1,10 @@
 //! What only the simulator knows: the result of an ideal measurement of the rig, the reference
 //! values for estimates, and the true state of the joint along z.
 
-use super::config::{Bushing, ContactLaw, OwnStructure, RigConfig};
-use super::structure::{Structure, turned};
+use super::config::{BodyName, Bushing, ContactLaw, OwnStructure, RigConfig};
+use super::structure::{Body, Structure, turned};
 use super::{Configuration, Probe};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{DMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// A stiffness smaller than this fraction of the largest counts as zero: metres and radians differ
@@ -22,10 +22,12 @@ pub struct Truth {
     pub contact_k_t_n_per_m: f64,
     /// Tangential damping c_T of the contact alone (N s/m).
     pub contact_c_t_n_s_per_m: f64,
-    /// Between the arms, 1 / C_zz at the virtual points with C the compliance of the contact and
-    /// both clamps in series (N/m).
+    /// Between the arms, 1 / C_zz at the virtual points with C the compliance of the contact, both
+    /// clamps, and of specimens that bend between clamp and contact, in series (N/m). The arms
+    /// themselves count as rigid: their bending is part of the substructures that are decoupled.
     pub between_arms_k_n_per_m: f64,
-    /// Of the clamps alone, the same way (N/m); `None` when both are rigid.
+    /// Of the clamps and of specimens that bend alone, the same way (N/m); `None` when all are
+    /// rigid.
     pub clamps_k_n_per_m: Option<f64>,
     /// `linear`, `jenkins` or `iwan`.
     pub law: ContactLaw,
@@ -46,6 +48,10 @@ impl RigConfig {
             let left = all - contact;
             return self.found(all, (left > 1e-9 * all).then_some(left));
         }
+        if self.bodies.specimen_a.beam.is_some() || self.bodies.specimen_b.beam.is_some() {
+            let all = self.between_papers_arms();
+            return self.found(all, Some(all - contact));
+        }
         let soft = [&self.clamp, &self.clamp_b].into_iter().filter(|clamp| !clamp.rigid);
         let clamps = soft.map(|clamp| self.compliance(&clamp.loaded, None)).reduce(|a, b| a + b);
         self.found(clamps.unwrap_or(0.0) + contact, clamps)
@@ -58,8 +64,13 @@ impl RigConfig {
         // the base is fixed like the ground; bodies attached to the arms' far sides follow them and
         // carry no force
         let free = own.bodies.iter().map(|body| body.name).filter(|name| *name != base);
-        let at_virtual_points = free.map(|name| (name, VIRTUAL_POINT_M)).collect();
-        let mut inner = Structure::empty(Configuration::Ajb, at_virtual_points, [false, false]);
+        let at_virtual_points = free.map(|name| {
+            let body = own.body(name).filter(|body| body.name != arm);
+            let beam = body.and_then(|body| Some((body.beam.as_ref()?, body.mass_kg)));
+            let mass_kg = beam.map_or(1.0, |(_, mass_kg)| mass_kg);
+            Body::new(name, VIRTUAL_POINT_M).bending(beam.map(|(beam, _)| beam), mass_kg, &[])
+        });
+        let mut inner = Structure::empty(Configuration::Ajb, at_virtual_points.collect(), [false, false]);
         for spring in own.springs.iter().filter(|spring| spring.present.contains(&Configuration::Ajb)) {
             // springs to the ground are not part of the joint
             if let [Some(from), Some(to)] = spring.ends() {
@@ -68,11 +79,52 @@ impl RigConfig {
         }
         let [from, to] = own.joint.map(Some);
         inner.connect_along(from, to, &self.contact.bushing(), self.contact.axes);
+        self.pulled(&inner, arm)
+    }
+
+    /// The same between the arms of the paper's rig, whose specimens bend.
+    fn between_papers_arms(&self) -> f64 {
+        let lumped = self.lumped();
+        let specimens =
+            [(BodyName::SpecimenA, &self.bodies.specimen_a), (BodyName::SpecimenB, &self.bodies.specimen_b)];
+        let mut bodies = vec![Body::new(BodyName::ArmA, VIRTUAL_POINT_M)];
+        for ((name, specimen), lumped) in specimens.into_iter().zip(lumped) {
+            if !lumped {
+                let (beam, mass_kg) = (specimen.beam.as_ref(), specimen.mass_kg);
+                let body = Body::new(name, VIRTUAL_POINT_M);
+                bodies.push(body.of_the_paper(self, Configuration::Ajb, beam, mass_kg));
+            }
+        }
+        let mut inner = Structure::empty(Configuration::Ajb, bodies, lumped);
+        let arms = [BodyName::ArmA, BodyName::ArmB].map(Some);
+        let clamps = [(&self.clamp, arms[0], specimens[0].0), (&self.clamp_b, arms[1], specimens[1].0)];
+        for (clamp, arm, specimen) in clamps {
+            if !clamp.rigid {
+                inner.connect_along(arm, Some(specimen), &clamp.loaded, None);
+            }
+        }
+        let [from, to] = self.joined().map(Some);
+        inner.connect_along(from, to, &self.contact.bushing(), self.contact.axes);
+        self.pulled(&inner, BodyName::ArmA)
+    }
+
+    /// Displacement along the sliding direction per force at the virtual point of `arm`.
+    fn pulled(&self, inner: &Structure, arm: BodyName) -> f64 {
         let pull = Probe { body: arm, position_m: VIRTUAL_POINT_M, direction: self.contact.sliding() };
         let Some(pull) = inner.row(&pull) else { return f64::NAN };
+        let mut stiffness = inner.stiffness.clone();
+        let mut pull = pull;
+        if inner.bends() {
+            // Elastic modes are stiffer than metres by orders of magnitude: each coordinate is
+            // scaled to unit stiffness, so that only an unconstrained motion is singular.
+            let scale = stiffness.diagonal().map(|k| if k > 0.0 { 1.0 / k.sqrt() } else { 1.0 });
+            stiffness =
+                DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * stiffness[(i, j)] * scale[j]);
+            pull.component_mul_assign(&scale);
+        }
         // an unconstrained motion does not contribute to the response to this force, if there is
         // one
-        let parts = inner.stiffness.svd(true, true);
+        let parts = stiffness.svd(true, true);
         let largest = parts.singular_values.max();
         let answer = parts.solve(&pull, largest * SMALLEST_OF_LARGEST);
         answer.map_or(f64::NAN, |motion| motion.dot(&pull))

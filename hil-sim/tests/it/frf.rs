@@ -88,7 +88,7 @@ fn specimen_rig_is_the_reference() {
 #[test]
 fn eigenfrequencies_are_the_reference() {
     // Undamped, printed to 0.001 Hz: tolerance of half a unit of the last digit.
-    let cases = [
+    let cases = vec![
         (
             RigConfig::default(),
             Configuration::A,

@@ -5,6 +5,7 @@ mod clamp_b;
 mod config;
 mod console;
 mod contact;
+mod elastic;
 mod fixed;
 mod flaws;
 mod frf;

@@ -13,6 +13,9 @@ const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
 /// A rig with accelerometers instead of lasers.
 const ACCELEROMETERS: &str = include_str!("../../rigs/accelerometers.toml");
 
+/// A rig whose bodies bend.
+const ELASTIC: &str = include_str!("../../rigs/elastic.toml");
+
 /// Path of every field, with dots between table names; the tables of a list share one path.
 fn fields(path: &str, value: &Value, found: &mut BTreeSet<String>) {
     match value {
@@ -57,9 +60,19 @@ fn the_page_and_the_rig_have_the_same_fields() {
     fields("", &toml::from_str(OWN).unwrap(), &mut known);
     fields("", &toml::from_str(BY_HAND).unwrap(), &mut known);
     fields("", &toml::from_str(ACCELEROMETERS).unwrap(), &mut known);
+    fields("", &toml::from_str(ELASTIC).unwrap(), &mut known);
     // fields that the examples omit: every spring is in all configurations, there is no load cell,
-    // and the converters have 16 bits
-    known.extend(["structure.springs.in", "structure.load_cells_on", "sensors.bits"].map(String::from));
+    // the converters have 16 bits, sections are aligned with the rig, own bodies are rigid
+    known.extend(
+        [
+            "structure.springs.in",
+            "structure.load_cells_on",
+            "sensors.bits",
+            "bodies.arm_a.beam.first_edge",
+            "structure.bodies.beam.young_pa",
+        ]
+        .map(String::from),
+    );
     let patterns = patterns();
     for path in &known {
         assert!(patterns.iter().any(|pattern| is_meant(pattern, path)), "`{path}` is not on the page");

@@ -2,11 +2,14 @@
 //! the rig, its fixed vibrometers and a user-defined structure (unknown names, springs that join
 //! nothing) are checked. Each error names the field, and its line in the text.
 
-use super::{BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side};
+use super::{
+    Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side,
+};
 use crate::rig::RigError;
 use crate::rig::channels::{CHANNELS, FORCE, channels};
 use jointrig_protocol::channel::{NARROW_BITS, WIDE_BITS};
 use jointrig_protocol::limits::MAX_CHANNELS;
+use nalgebra::Vector3;
 use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -15,6 +18,17 @@ use toml::de::{DeTable, DeValue};
 const MOST_SLIP_STEPS: f64 = 1000.0;
 /// Minimum stiffness of a contact, N/m: a smaller value was probably given in N/µm or N/mm.
 const SOFTEST_N_PER_M: f64 = 1e4;
+/// Minimum length of a beam over the largest edge of its section: shorter, its sections are not
+/// plane.
+const SHORTEST_BEAM: f64 = 0.25;
+/// Maximum ratio of the edges of a beam's section.
+const THICKEST_BEAM: f64 = 100.0;
+/// Range of Young's modulus (Pa): from plastics to a thousand times steel, which is practically
+/// rigid.
+const SOFTEST_PA: f64 = 1e8;
+const STIFFEST_PA: f64 = 1e15;
+/// Maximum number of elements of a beam.
+const MOST_BEAM_ELEMENTS: u32 = 20;
 /// Maximum number of elements of an Iwan contact: more would only cost time.
 const MOST_ELEMENTS: u32 = 1000;
 
@@ -38,7 +52,7 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     bushing("clamp.free", &config.clamp.free)?;
     bushing("clamp_b.loaded", &config.clamp_b.loaded)?;
     bushing("clamp_b.free", &config.clamp_b.free)?;
-    if !config.clamp_b.rigid && bodies.specimen_b.mass_kg >= bodies.arm_b.mass_kg {
+    if !config.lumped()[1] && bodies.specimen_b.mass_kg >= bodies.arm_b.mass_kg {
         return Err(bad(
             "bodies.specimen_b.mass_kg",
             "must be less than arm B's, which is stated with its specimen",
@@ -354,6 +368,9 @@ pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
 pub(super) fn body(field: &str, body: &RigidBody) -> Result<(), RigError> {
     positive(&format!("{field}.mass_kg"), body.mass_kg)?;
     finite(&format!("{field}.cg_m"), &body.cg_m)?;
+    if let Some(beam) = &body.beam {
+        check_beam(&format!("{field}.beam"), beam)?;
+    }
     match (body.inertia_kg_m2, body.box_m) {
         (Some(_), Some(_)) => Err(bad(field, "has both box_m and inertia_kg_m2: give one of them")),
         (Some(inertia), None) => {
@@ -362,6 +379,60 @@ pub(super) fn body(field: &str, body: &RigidBody) -> Result<(), RigError> {
         (None, Some(edges)) => edges.iter().try_for_each(|value| positive(&format!("{field}.box_m"), *value)),
         (None, None) => Err(bad(field, "needs box_m or inertia_kg_m2 to have an inertia")),
     }
+}
+
+fn check_beam(field: &str, beam: &Beam) -> Result<(), RigError> {
+    let inner = |name: &str| format!("{field}.{name}");
+    finite(&inner("from_m"), &beam.from_m)?;
+    finite(&inner("to_m"), &beam.to_m)?;
+    for edge in beam.section_m {
+        positive(&inner("section_m"), edge)?;
+    }
+    let axis = Vector3::from(beam.to_m) - Vector3::from(beam.from_m);
+    let (length, largest) = (axis.norm(), beam.section_m[0].max(beam.section_m[1]));
+    if length < SHORTEST_BEAM * largest {
+        let reason = format!(
+            "is {length} m from from_m; a beam is at least {SHORTEST_BEAM} times its largest edge long ({largest} m)"
+        );
+        return Err(bad(&inner("to_m"), &reason));
+    }
+    if largest > THICKEST_BEAM * beam.section_m[0].min(beam.section_m[1]) {
+        return Err(bad(
+            &inner("section_m"),
+            &format!("has edges that differ by more than a factor of {THICKEST_BEAM}: that is a plate"),
+        ));
+    }
+    if let Some(edge) = beam.first_edge {
+        finite(&inner("first_edge"), &edge)?;
+        let edge = Vector3::from(edge);
+        // NaN for a zero vector
+        let sine = edge.cross(&axis).norm() / (edge.norm() * length);
+        if sine.is_nan() || sine < 0.1 {
+            return Err(bad(&inner("first_edge"), "must not point along the beam's axis"));
+        }
+    }
+    finite(&inner("young_pa"), &[beam.young_pa])?;
+    if !(SOFTEST_PA..=STIFFEST_PA).contains(&beam.young_pa) {
+        let reason = format!(
+            "must be {SOFTEST_PA:.0e} to {STIFFEST_PA:.0e}, not {:e}: the unit is Pa, 2.1e11 for steel",
+            beam.young_pa
+        );
+        return Err(bad(&inner("young_pa"), &reason));
+    }
+    if !(0.0..0.5).contains(&beam.poisson) {
+        return Err(bad(
+            &inner("poisson"),
+            &format!("must be at least 0 and less than 0.5, not {}", beam.poisson),
+        ));
+    }
+    not_negative(&inner("damping_s"), beam.damping_s)?;
+    if !(1..=MOST_BEAM_ELEMENTS).contains(&beam.elements) {
+        return Err(bad(
+            &inner("elements"),
+            &format!("must be 1 to {MOST_BEAM_ELEMENTS}, not {}", beam.elements),
+        ));
+    }
+    Ok(())
 }
 
 pub(super) fn bushing(field: &str, bushing: &Bushing) -> Result<(), RigError> {

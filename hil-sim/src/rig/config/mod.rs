@@ -5,6 +5,7 @@
 //! merge into the default's, its lists replace the default's lists.
 
 use super::{Configuration, RigError, normalized};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -29,7 +30,7 @@ pub struct RigConfig {
     /// User-defined bodies and springs, instead of the fields below up to the load cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub structure: Option<OwnStructure>,
-    /// The rigid bodies.
+    /// The bodies.
     pub bodies: Bodies,
     /// Ground to moving mass.
     pub leaf_springs: Vec<Bushing>,
@@ -92,6 +93,14 @@ impl RigConfig {
         table.to_string()
     }
 
+    /// Whether the specimens of A and B are part of their arms: they are if they do not bend and
+    /// their clamps are rigid.
+    pub(super) fn lumped(&self) -> [bool; 2] {
+        let bodies = &self.bodies;
+        let ends = [(&self.clamp, &bodies.specimen_a), (&self.clamp_b, &bodies.specimen_b)];
+        ends.map(|(clamp, specimen)| clamp.rigid && specimen.beam.is_none())
+    }
+
     /// Whether `configuration` has `body`.
     pub fn has(&self, configuration: Configuration, body: BodyName) -> bool {
         let Some(own) = &self.structure else { return configuration.has(body) };
@@ -127,7 +136,7 @@ impl Default for RigConfig {
     }
 }
 
-/// The rigid bodies.
+/// The bodies of the paper's rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bodies {
@@ -139,11 +148,12 @@ pub struct Bodies {
     pub specimen_a: RigidBody,
     /// Arm B with its specimen.
     pub arm_b: RigidBody,
-    /// Specimen B: subtracted from arm B and a separate body when its clamp is not rigid.
+    /// Specimen B: subtracted from arm B and a separate body when its clamp is not rigid or it
+    /// bends.
     pub specimen_b: RigidBody,
 }
 
-/// A rigid body: six degrees of freedom at its centre of gravity.
+/// A body: rigid, with six degrees of freedom at its centre of gravity, or a beam that bends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigidBody {
@@ -157,6 +167,48 @@ pub struct RigidBody {
     /// Principal inertia Ixx, Iyy, Izz (kg m²); instead of the box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia_kg_m2: Option<[f64; 3]>,
+    /// How it bends; rigid if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam: Option<Beam>,
+}
+
+/// The elasticity of a body: a straight beam of rectangular section. Mass, centre of gravity and
+/// inertia remain those of the body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Beam {
+    /// One end of its axis (m).
+    pub from_m: [f64; 3],
+    /// The other end (m). Beyond the ends the body moves rigidly with the end sections.
+    pub to_m: [f64; 3],
+    /// Edge lengths of the section (m).
+    pub section_m: [f64; 2],
+    /// Direction of the first edge (any length; only its part across the axis counts); if not
+    /// given, that of x, y and z which comes first among the two that are most across the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_edge: Option<[f64; 3]>,
+    /// Young's modulus (Pa).
+    pub young_pa: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// β (s) of the material's damping C = β K.
+    #[serde(default)]
+    pub damping_s: f64,
+    /// Number of finite elements.
+    #[serde(default = "two")]
+    pub elements: u32,
+}
+
+fn two() -> u32 {
+    2
+}
+
+impl Beam {
+    /// Direction of the section's first edge for an axis along the unit vector `along`.
+    pub(super) fn first_edge(&self, along: [f64; 3]) -> Vector3<f64> {
+        let axial = (0..3).max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).unwrap_or(0);
+        self.first_edge.map_or_else(|| Vector3::ith(usize::from(axial == 0), 1.0), Vector3::from)
+    }
 }
 
 /// A massless spring and dashpot for all six relative motions at one point.
@@ -189,7 +241,8 @@ pub struct Tether {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clamp {
-    /// No clamp: arm and specimen are one body.
+    /// No clamp: arm and specimen are one body, or joined rigidly at the clamp's position if the
+    /// specimen bends.
     pub rigid: bool,
     /// Under the normal load: in the assembly.
     pub loaded: Bushing,

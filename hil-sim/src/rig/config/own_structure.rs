@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{BodyName, Bushing, RigidBody};
+use super::{Beam, BodyName, Bushing, RigidBody};
 use crate::rig::Configuration;
 
-/// Any rigid bodies, the springs between them, and the two bodies that the contact joins.
+/// Any bodies, the springs between them, and the two bodies that the contact joins.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnStructure {
@@ -39,7 +39,7 @@ pub enum Side {
     B,
 }
 
-/// A rigid body of a substructure. (It repeats the fields of [`RigidBody`], because serde cannot
+/// A body of a substructure. (It repeats the fields of [`RigidBody`], because serde cannot
 /// refuse unknown fields in a flattened struct.)
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -58,16 +58,20 @@ pub struct OwnBody {
     /// Principal inertia Ixx, Iyy, Izz (kg m²); instead of the box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia_kg_m2: Option<[f64; 3]>,
+    /// How it bends; rigid if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam: Option<Beam>,
 }
 
 impl OwnBody {
-    /// Mass and inertia.
+    /// Mass, inertia and elasticity.
     pub fn rigid(&self) -> RigidBody {
         RigidBody {
             mass_kg: self.mass_kg,
             cg_m: self.cg_m,
             box_m: self.box_m,
             inertia_kg_m2: self.inertia_kg_m2,
+            beam: self.beam.clone(),
         }
     }
 }
