@@ -18,19 +18,42 @@ fn main() {
 /// One record: fire, then two seconds of decay.
 #[divan::bench(args = ["A", "B", "AJB"])]
 fn record_modal(bencher: Bencher, configuration: &str) {
-    record(bencher, configuration, Stepping::Fastest, 2);
+    let mut rig = Rig::new(&RigConfig::default(), 1).expect("the default rig stands");
+    record(bencher, &mut rig, configuration, 2);
 }
 
 /// The same with the matrix exponential, for half the time.
 #[divan::bench(args = ["A", "B", "AJB"], sample_count = 10)]
 fn record_exponential(bencher: Bencher, configuration: &str) {
-    record(bencher, configuration, Stepping::Exponential, 1);
+    let config = RigConfig::default();
+    let mut rig = Rig::with_stepping(&config, 1, Stepping::Exponential).expect("the default rig stands");
+    record(bencher, &mut rig, configuration, 1);
+}
+
+/// A record of the assembly with rigid bodies, and with specimens and arms that bend, staging
+/// included.
+#[divan::bench(args = ["rigid", "elastic"])]
+fn record_of(bencher: Bencher, bodies: &str) {
+    let mut rig = Rig::new(&with(bodies), 1).expect("a shipped rig stands");
+    record(bencher, &mut rig, "AJB", 2);
+}
+
+/// Preparation of a rig: its structures and their modes.
+#[divan::bench(args = ["rigid", "elastic"], sample_count = 10)]
+fn new_rig(bencher: Bencher, bodies: &str) {
+    let config = with(bodies);
+    bencher.bench_local(|| Rig::new(black_box(&config), 1).expect("a shipped rig stands"));
+}
+
+fn with(bodies: &str) -> RigConfig {
+    let text = if bodies == "elastic" { include_str!("../rigs/elastic.toml") } else { "" };
+    RigConfig::from_toml(text).expect("a shipped rig stands")
 }
 
 /// Every mode is driven in every scan, so that no mode decays.
-#[divan::bench]
-fn shaker_modal(bencher: Bencher) {
-    let mut rig = Rig::new(&RigConfig::default(), 1).expect("the default rig stands");
+#[divan::bench(args = ["rigid", "elastic"])]
+fn shaker_modal(bencher: Bencher, bodies: &str) {
+    let mut rig = Rig::new(&with(bodies), 1).expect("a shipped rig stands");
     let mut codes = [0_i16; CHANNELS];
     bencher.counter(ItemsCount::new(1_u64)).bench_local(|| {
         for scan in 0..SECOND {
@@ -62,14 +85,13 @@ fn shaker_slip(bencher: Bencher, case: &str) {
     assert_eq!(slid_m > 0.0, case != "stuck", "it slides where it should");
 }
 
-fn record(bencher: Bencher, configuration: &str, stepping: Stepping, seconds: u64) {
+fn record(bencher: Bencher, rig: &mut Rig, configuration: &str, seconds: u64) {
     let configuration = match configuration {
         "A" => Configuration::A,
         "B" => Configuration::B,
         _ => Configuration::Ajb,
     };
     let (impact, response) = if configuration == Configuration::B { ("BZ3", "B3") } else { ("AZ3", "A3") };
-    let mut rig = Rig::with_stepping(&RigConfig::default(), 1, stepping).expect("the default rig stands");
     let mut codes = [0_i16; CHANNELS];
     bencher.counter(ItemsCount::new(seconds)).bench_local(|| {
         rig.stage(configuration, impact, response, 0).expect("the default rig has this cell");

@@ -297,3 +297,287 @@ pub(super) fn rigid_motion(at: [f64; 3], from: [f64; 3]) -> Matrix6<f64> {
     motion.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew);
     motion
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::{Matrix4, Vector6};
+
+    use super::*;
+
+    const YOUNG: f64 = 2.1e11;
+    const POISSON: f64 = 0.29;
+    /// Mass of each beam below (kg).
+    const MASS_KG: f64 = 0.7;
+
+    /// A beam of this length and section, along an axis that is not aligned with the rig's.
+    fn skew(length_m: f64, section_m: [f64; 2], elements: u32) -> Beam {
+        let along = normalized([0.3, -0.5, 0.8]);
+        let from_m = [0.01, -0.02, 0.03];
+        let to_m = std::array::from_fn(|axis| from_m[axis] + length_m * along[axis]);
+        let first_edge = Some([0.2, 1.0, 0.1]);
+        Beam {
+            from_m,
+            to_m,
+            section_m,
+            first_edge,
+            young_pa: YOUNG,
+            poisson: POISSON,
+            damping_s: 0.0,
+            elements,
+        }
+    }
+
+    fn shapes(beam: &Beam) -> Shapes {
+        Shapes::new(beam, MASS_KG, &[]).expect("a beam")
+    }
+
+    /// Motion of the end `to_m` per mode, in the beam's axes, with the end `from_m` held.
+    fn tip(beam: &Beam) -> Matrix6xX<f64> {
+        let shapes = shapes(beam);
+        let held = shapes.at(beam.from_m);
+        let motion = shapes.at(beam.to_m) - rigid_motion(beam.to_m, beam.from_m) * held;
+        let mut turned = Matrix6::zeros();
+        for at in [0, 3] {
+            turned.fixed_view_mut::<3, 3>(at, at).copy_from(&shapes.elements[0].axes.transpose());
+        }
+        turned * motion
+    }
+
+    /// Area, second moments for deflection along each edge, shear stiffness κGA, torsion stiffness.
+    fn section(a: f64, b: f64) -> (f64, [f64; 2], f64, f64) {
+        let modulus = YOUNG / (2.0 * (1.0 + POISSON));
+        let cowper = 10.0 * (1.0 + POISSON) / (12.0 + 11.0 * POISSON);
+        let moments = [b * a.powi(3) / 12.0, a * b.powi(3) / 12.0];
+        (a * b, moments, cowper * modulus * a * b, modulus * torsion_constant(a, b))
+    }
+
+    #[test]
+    fn the_torsion_constant_is_the_text_books() {
+        // Timoshenko and Goodier, Theory of Elasticity, table of k₁ for a/b of 1, 2 and 10
+        for (ratio, expected) in [(1.0, 0.1406), (2.0, 0.229), (10.0, 0.312)] {
+            let constant = torsion_constant(ratio, 1.0);
+            // the table has three or four digits
+            assert!((constant / ratio - expected).abs() < 5.1e-4, "{ratio}: {constant}");
+            assert!((torsion_constant(1.0, ratio) / constant - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_cantilever_gives_what_theory_says() {
+        for (length, [a, b], elements) in [
+            (0.2, [0.05, 0.044], 1),
+            (0.2, [0.05, 0.044], 3),
+            (0.014, [0.018, 0.014], 1),
+            (0.3, [0.004, 0.012], 2),
+        ] {
+            let beam = skew(length, [a, b], elements);
+            let tip = tip(&beam);
+            let flexibility = DMatrix::from_diagonal(&shapes(&beam).squares.map(|square| 1.0 / square));
+            let found = &tip * flexibility * tip.transpose();
+            let (area, moments, shear, twist) = section(a, b);
+            let mut expected = Matrix6::zeros();
+            expected[(0, 0)] = length / (YOUNG * area);
+            expected[(3, 3)] = length / twist;
+            for (deflects, turns, sign, moment) in [(1, 5, 1.0, moments[0]), (2, 4, -1.0, moments[1])] {
+                let bending = YOUNG * moment;
+                expected[(deflects, deflects)] = length.powi(3) / (3.0 * bending) + length / shear;
+                expected[(turns, turns)] = length / bending;
+                expected[(deflects, turns)] = sign * length * length / (2.0 * bending);
+                expected[(turns, deflects)] = expected[(deflects, turns)];
+            }
+            // relative to the two diagonal entries, which have different units
+            for i in 0..6 {
+                for j in 0..6 {
+                    let unit = (expected[(i, i)] * expected[(j, j)]).sqrt();
+                    let off = (found[(i, j)] - expected[(i, j)]).abs() / unit;
+                    assert!(off < 1e-9, "{length} {a} {b} ({i}, {j}): {off:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_node_at_a_load_makes_its_deflection_exact() {
+        // held at one end, loaded at 0.7 of the length: the part beyond the load remains straight
+        let (length, a, b) = (0.1, 0.02, 0.012);
+        let beam = skew(length, [a, b], 1);
+        let load_m =
+            std::array::from_fn(|axis| beam.from_m[axis] + 0.7 * (beam.to_m[axis] - beam.from_m[axis]));
+        let shapes = Shapes::new(&beam, MASS_KG, &[load_m, beam.to_m]).expect("a beam");
+        assert_eq!(shapes.elements.len(), 2);
+        let at =
+            |place: [f64; 3]| shapes.at(place) - rigid_motion(place, beam.from_m) * shapes.at(beam.from_m);
+        let flexibility = DMatrix::from_diagonal(&shapes.squares.map(|square| 1.0 / square));
+        let edge: Vector3<f64> = shapes.elements[0].axes.column(1).into_owned();
+        let force = Vector6::new(edge.x, edge.y, edge.z, 0.0, 0.0, 0.0);
+        let motion = at(beam.to_m) * flexibility * at(load_m).transpose() * force;
+        let (_, [moment, _], shear, _) = section(a, b);
+        let (load, bending) = (0.7 * length, YOUNG * moment);
+        let expected = load * load * (3.0 * length - load) / (6.0 * bending) + load / shear;
+        let found = motion.fixed_rows::<3>(0).dot(&edge);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} for {expected}");
+    }
+
+    #[test]
+    fn points_move_with_their_sections_and_with_the_ends_beyond_them() {
+        let beam = skew(0.1, [0.02, 0.012], 2);
+        let shapes = shapes(&beam);
+        let along = shapes.elements[0].along();
+        let place = |along_m: f64, off: Vector3<f64>| -> [f64; 3] {
+            (Vector3::from(beam.from_m) + along * along_m + off).into()
+        };
+        let off = along.cross(&Vector3::new(0.003, 0.001, -0.002));
+        for along_m in [0.0, 0.031, 0.05, 0.1] {
+            let (axis, beside) = (place(along_m, Vector3::zeros()), place(along_m, off));
+            let expected = rigid_motion(beside, axis) * shapes.at(axis);
+            assert!((shapes.at(beside) - expected).norm() < 1e-9 * shapes.at(axis).norm());
+        }
+        for (end, beyond) in [(0.0, -0.02), (0.1, 0.13)] {
+            let (end, beyond) = (place(end, Vector3::zeros()), place(beyond, off));
+            let expected = rigid_motion(beyond, end) * shapes.at(end);
+            assert!((shapes.at(beyond) - expected).norm() < 1e-9 * shapes.at(end).norm());
+        }
+    }
+
+    /// Frequencies (Hz) of the beam with its first end held, lowest first.
+    fn cantilever_hz(beam: &Beam) -> Vec<f64> {
+        let shapes = shapes(beam);
+        let [a, b] = beam.section_m;
+        let axis = Vector3::from(beam.to_m) - Vector3::from(beam.from_m);
+        let length = axis.norm();
+        // rigid motion of a homogeneous box about its end, in the beam's axes
+        let centre = rigid_motion([length / 2.0, 0.0, 0.0], [0.0; 3]);
+        let inertia = [a * a + b * b, length * length + b * b, length * length + a * a];
+        let inertia = inertia.map(|sum| MASS_KG / 12.0 * sum);
+        let diagonal = [MASS_KG, MASS_KG, MASS_KG, inertia[0], inertia[1], inertia[2]];
+        let rigid = centre.transpose() * Matrix6::from_diagonal(&diagonal.into()) * centre;
+        let mut turned = Matrix6::zeros();
+        for at in [0, 3] {
+            turned.fixed_view_mut::<3, 3>(at, at).copy_from(&shapes.elements[0].axes.transpose());
+        }
+        let held = turned * shapes.at(beam.from_m);
+        let modes = shapes.modes();
+        let mass = DMatrix::identity(modes, modes) + held.transpose() * rigid * &held;
+        let root = shapes.squares.map(|square| 1.0 / square.sqrt());
+        let reduced = DMatrix::from_fn(modes, modes, |i, j| root[i] * mass[(i, j)] * root[j]);
+        let mut hz: Vec<f64> =
+            SymmetricEigen::new(reduced).eigenvalues.iter().map(|value| 1.0 / value.sqrt() / TAU).collect();
+        hz.sort_by(f64::total_cmp);
+        hz
+    }
+
+    fn free_hz(beam: &Beam) -> Vec<f64> {
+        let mut hz: Vec<f64> = shapes(beam).squares.iter().map(|square| square.sqrt() / TAU).collect();
+        hz.sort_by(f64::total_cmp);
+        hz
+    }
+
+    #[test]
+    fn a_slender_beam_has_eulers_frequencies() {
+        let (length, a, b) = (0.5, 0.006, 0.005);
+        let beam = skew(length, [a, b], 4);
+        let line_kg_per_m = MASS_KG / length;
+        let (_, moments, ..) = section(a, b);
+        let euler = |wave: f64, moment: f64| {
+            wave * wave / (TAU * length * length) * (YOUNG * moment / line_kg_per_m).sqrt()
+        };
+        // softer along the second edge; slender: shear and rotary inertia lower them by (h/L)² or so
+        for (found, moment) in cantilever_hz(&beam).iter().zip([moments[1], moments[0]]) {
+            let expected = euler(1.875_104_07, moment);
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found} Hz for {expected}");
+        }
+        for (found, moment) in free_hz(&beam).iter().zip([moments[1], moments[0]]) {
+            let expected = euler(4.730_040_74, moment);
+            assert!((found / expected - 1.0).abs() < 2e-3, "{found} Hz for {expected}");
+        }
+    }
+
+    /// First bending frequency (Hz) of a free Timoshenko beam: where the transfer matrix over its
+    /// length leaves deflection and rotation of a free end possible.
+    fn timoshenko_free_hz(length: f64, a: f64, b: f64) -> f64 {
+        let (area, [moment, _], shear, _) = section(a, b);
+        let density = MASS_KG / (area * length);
+        let shut = |hz: f64| -> f64 {
+            let square = (TAU * hz) * (TAU * hz);
+            // deflection v, rotation θ, moment EI θ', shear force κGA (v' − θ)
+            let step = Matrix4::new(
+                0.0,
+                1.0,
+                0.0,
+                1.0 / shear,
+                0.0,
+                0.0,
+                1.0 / (YOUNG * moment),
+                0.0,
+                0.0,
+                -density * moment * square,
+                0.0,
+                -1.0,
+                -density * area * square,
+                0.0,
+                0.0,
+                0.0,
+            );
+            // scaled so that all entries are near one
+            let scale = Matrix4::from_diagonal(&nalgebra::Vector4::new(
+                length,
+                1.0,
+                YOUNG * moment / length,
+                YOUNG * moment / length / length,
+            ));
+            let inverse = scale.try_inverse().expect("a diagonal without zeros");
+            let over = (inverse * step * scale * length).exp();
+            over[(2, 0)] * over[(3, 1)] - over[(2, 1)] * over[(3, 0)]
+        };
+        let euler = 4.73 * 4.73 / (TAU * length * length) * (YOUNG * moment / (density * area)).sqrt();
+        let (mut low, mut high) = (0.05 * euler, 1.05 * euler);
+        assert!(shut(low) * shut(high) < 0.0, "one root between");
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if shut(low) * shut(middle) <= 0.0 { high = middle } else { low = middle }
+        }
+        low
+    }
+
+    #[test]
+    fn a_stout_beam_has_timoshenkos_frequency() {
+        for (length, [a, b]) in [(0.2, [0.05, 0.044]), (0.06, [0.02, 0.015])] {
+            let expected = timoshenko_free_hz(length, b, a);
+            for (elements, most) in [(2, 0.05), (5, 0.01), (10, 3e-3)] {
+                let found = free_hz(&skew(length, [a, b], elements))[0];
+                // exact static shapes are stiffer than the vibrating ones: from above
+                let off = found / expected - 1.0;
+                assert!((0.0..most).contains(&off), "{elements}: {found} Hz for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn it_twists_and_stretches_as_a_rod() {
+        let (length, a, b) = (0.2, 0.05, 0.01);
+        let beam = skew(length, [a, b], 12);
+        let (area, [first, second], _, twist) = section(a, b);
+        let density = MASS_KG / (area * length);
+        let torsion = (twist / (density * (first + second))).sqrt() / (2.0 * length);
+        let axial = (YOUNG / density).sqrt() / (2.0 * length);
+        let shapes = shapes(&beam);
+        let along = shapes.elements[0].along();
+        let ends = shapes.at(beam.to_m);
+        // the lowest mode in which an end's motion is almost entirely of this kind
+        let lowest = |turns: bool| {
+            let of_kind = (0..shapes.modes()).filter(|mode| {
+                let motion = ends.column(*mode);
+                let (moved, turned) = (motion.fixed_rows::<3>(0), motion.fixed_rows::<3>(3));
+                let along =
+                    if turns { turned.dot(&along) / turned.norm() } else { moved.dot(&along) / moved.norm() };
+                along.abs() > 0.99
+            });
+            of_kind.map(|mode| shapes.squares[mode].sqrt() / TAU).fold(f64::INFINITY, f64::min)
+        };
+        // linear shapes on twelve elements: (π/12)²/24
+        assert!((lowest(true) / torsion - 1.0).abs() < 3e-3, "{} for {torsion}", lowest(true));
+        assert!((lowest(false) / axial - 1.0).abs() < 3e-3, "{} for {axial}", lowest(false));
+    }
+}
