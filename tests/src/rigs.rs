@@ -3,7 +3,7 @@
 
 use jointrig::campaign::plan::CONTACT_BY_HAND;
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_hil_sim::rig::config::{BodyName, Bushing, ContactLaw, Errors, ResponsePoint};
+use jointrig_hil_sim::rig::config::{Beam, BodyName, Bushing, ContactLaw, Errors, ResponsePoint};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -23,12 +23,30 @@ pub struct Drawn {
     /// instead of lasers and a coil. Such rigs have a rigid clamp on side B: its front end has no
     /// channels for sensors on both arm and specimen.
     pub accelerometers: bool,
+    /// Which bodies bend; `None`: all are rigid.
+    pub elastic: Option<Elastic>,
+}
+
+/// Which bodies of a drawn rig bend, in addition to its specimens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Elastic {
+    /// Only the specimens.
+    Specimens,
+    /// Also the arms.
+    SpecimensAndArms,
 }
 
 impl Default for Drawn {
     /// Contacts up to 300 N/µm that stick, with the default errors.
     fn default() -> Self {
-        Drawn { stiffest_n_per_m: 300e6, errors: 1.0, gain: 0.005, slip_limit_n: None, accelerometers: false }
+        Drawn {
+            stiffest_n_per_m: 300e6,
+            errors: 1.0,
+            gain: 0.005,
+            slip_limit_n: None,
+            accelerometers: false,
+            elastic: None,
+        }
     }
 }
 
@@ -69,19 +87,7 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     if number.is_multiple_of(3) {
         rig.clamp_b.rigid = false;
         clamp(&mut rig.clamp_b.loaded, -1.0, [2.0, 20.0]);
-        let specimen: Vec<ResponsePoint> = rig
-            .responses
-            .iter()
-            .filter(|point| point.body == BodyName::SpecimenA)
-            .map(|point| ResponsePoint {
-                name: point.name.replace('S', "T").replace('N', "M"),
-                body: BodyName::SpecimenB,
-                position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
-                speckle: false,
-                ..*point
-            })
-            .collect();
-        rig.responses.extend(specimen);
+        mirror_points(&mut rig);
     }
     for specimen in [&mut rig.bodies.specimen_a, &mut rig.bodies.specimen_b] {
         let factor = between(0.7, 1.5);
@@ -125,7 +131,81 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         *error *= drawn.errors;
     }
     errors.gain = drawn.gain;
+    if let Some(which) = drawn.elastic {
+        rig = elastic(number, rig, which);
+    }
     if drawn.accelerometers { with_accelerometers(rig, drawn.errors) } else { rig }
+}
+
+/// Adds the points of specimen A, mirrored, to specimen B: T1–T6, M1 and M2.
+fn mirror_points(rig: &mut RigConfig) {
+    let of_a = rig.responses.iter().filter(|point| point.body == BodyName::SpecimenA);
+    let mirrored = of_a.map(|point| ResponsePoint {
+        name: point.name.replace('S', "T").replace('N', "M"),
+        body: BodyName::SpecimenB,
+        position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
+        speckle: false,
+        ..*point
+    });
+    let mirrored: Vec<_> = mirrored.collect();
+    rig.responses.extend(mirrored);
+}
+
+/// The same rig with specimens, or specimens and arms, of steel or aluminium that bend; masses
+/// remain. Both specimens have one material and section with edges of 8…20 mm; they reach from the
+/// contact 1.1…1.6 times as far as the clamp. Arms are of one material too, with edges of 0.7…1.1
+/// times those of the default rig's boxes. Specimen B has the points T1–T6, M1 and M2 whether or
+/// not its clamp is rigid. The draw has its own random stream, so that the rest of the rig is that
+/// of the same number without it.
+pub fn elastic(number: u64, mut rig: RigConfig, which: Elastic) -> RigConfig {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(0x00e1_a571_0000 + number);
+    let mut between = |low: f64, high: f64| -> f64 {
+        let u: f64 = random.random();
+        low * (high / low).powf(u)
+    };
+    let material = |between: &mut dyn FnMut(f64, f64) -> f64| {
+        let steel = between(1.0, 2.0) < 2.0_f64.sqrt();
+        let (steels, aluminiums) = (between(200e9, 215e9), between(68e9, 73e9));
+        let (young_pa, poisson) = if steel { (steels, 0.29) } else { (aluminiums, 0.33) };
+        (young_pa, poisson, between(3e-8, 3e-7))
+    };
+    let (young_pa, poisson, damping_s) = material(&mut between);
+    let section_m = [between(0.008, 0.02), between(0.008, 0.02)];
+    let beyond = between(1.1, 1.6);
+    let specimen = |clamp_m: f64| Beam {
+        from_m: [0.0; 3],
+        to_m: [0.0, clamp_m * beyond, 0.0],
+        section_m,
+        first_edge: None,
+        young_pa,
+        poisson,
+        damping_s,
+        elements: 1,
+    };
+    let clamps_m = [&rig.clamp, &rig.clamp_b].map(|clamp| clamp.loaded.position_m[1]);
+    rig.bodies.specimen_a.beam = Some(specimen(clamps_m[0]));
+    rig.bodies.specimen_b.beam = Some(specimen(clamps_m[1]));
+    let (young_pa, poisson, damping_s) = material(&mut between);
+    let edges = [between(0.7, 1.1), between(0.7, 1.1)];
+    if which == Elastic::SpecimensAndArms {
+        for arm in [&mut rig.bodies.arm_a, &mut rig.bodies.arm_b] {
+            let ([_, y, z], [a, b, length]) = (arm.cg_m, arm.box_m.unwrap());
+            arm.beam = Some(Beam {
+                from_m: [0.0, y, z - length / 2.0],
+                to_m: [0.0, y, z + length / 2.0],
+                section_m: [a * edges[0], b * edges[1]],
+                first_edge: None,
+                young_pa,
+                poisson,
+                damping_s,
+                elements: 2,
+            });
+        }
+    }
+    if rig.clamp_b.rigid {
+        mirror_points(&mut rig);
+    }
+    rig
 }
 
 /// The same rig with the sensors and the person of `accelerometers.toml`.
@@ -247,4 +327,43 @@ pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
 /// sticks.
 pub fn levels_plan(rig: &RigConfig) -> String {
     format!("{}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n", contact_plan(rig))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointrig_hil_sim::rig::Rig;
+
+    #[test]
+    fn elastic_rigs_stand_and_are_otherwise_the_rigid_ones() {
+        let elastic = Drawn { elastic: Some(Elastic::SpecimensAndArms), ..Drawn::default() };
+        let [mut soft, mut stiff] = [0, 0];
+        for number in 700..712 {
+            let (rigid, bends) = (drawn(number, Drawn::default()), drawn(number, elastic));
+            assert_eq!(RigConfig::from_toml(&bends.to_toml()).unwrap(), bends, "{number}");
+            let rig = Rig::new(&bends, 1).unwrap();
+            assert_eq!(rig.fallback(), None, "{number}");
+            let steel = bends.bodies.specimen_a.beam.as_ref().unwrap().young_pa > 1e11;
+            if steel {
+                stiff += 1
+            } else {
+                soft += 1
+            }
+            let (rigid_truth, truth) = (rigid.truth(), bends.truth());
+            assert_eq!(rigid_truth.contact_k_t_n_per_m, truth.contact_k_t_n_per_m);
+            assert!(truth.between_arms_k_n_per_m < rigid_truth.between_arms_k_n_per_m, "{number}");
+            let mut same = bends.clone();
+            let bodies = &mut same.bodies;
+            for body in [&mut bodies.specimen_a, &mut bodies.specimen_b, &mut bodies.arm_a, &mut bodies.arm_b]
+            {
+                assert!(body.beam.take().is_some());
+            }
+            for name in ["N1", "N2", "M1", "M2"] {
+                assert!(same.responses.iter().any(|point| point.name == name), "{number} {name}");
+            }
+            same.responses.truncate(rigid.responses.len());
+            assert_eq!(same, rigid, "{number}");
+        }
+        assert!(soft > 0 && stiff > 0, "{soft} {stiff}");
+    }
 }

@@ -80,6 +80,10 @@ const PAPERS: [BodyName; 5] =
     [BodyName::Mass, BodyName::ArmA, BodyName::SpecimenA, BodyName::ArmB, BodyName::SpecimenB];
 
 impl BodyName {
+    /// The fixed end of a spring.
+    pub(super) const GROUND: Self =
+        Self::Own(OwnName { bytes: *b"ground\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", length: 6 });
+
     /// The name in rig files.
     pub fn as_str(&self) -> &str {
         match self {

@@ -11,7 +11,8 @@
 //! configuration, cell, attempt, purpose) and counted from the last [`Rig::stage`] or
 //! [`Rig::fire`]: never to absolute time, never to what happened in other cells. [`Rig::stage`]
 //! puts the structure at rest. Within a cell the decay of an earlier hit is physical and does
-//! depend on the scans that have passed since.
+//! depend on the scans that have passed since. The only exception is a contact that drifts: it also
+//! depends on the hits and scans since the rig was started.
 //!
 //! **Cost.** A scan of the assembly at 51.2 kHz takes about 0.1 µs; `benches/rig.rs` measures it.
 
@@ -64,6 +65,7 @@ pub struct Rig {
     connected: Option<Connected>,
     flaws: Flaws,
     plants: [Plant; 3],
+    stepping: Stepping,
     configuration: Configuration,
     impact: String,
     response: String,
@@ -83,6 +85,10 @@ pub struct Rig {
     truth: [f64; CHANNELS],
     coil_pulses_s: Vec<f64>,
     last_hit: Option<Hit>,
+    /// Scans and hits since the rig was started: only a contact that drifts depends on them.
+    total: (u64, u64),
+    /// The rig with its contact as it was when the cell was staged, if it drifts.
+    drifted: Option<Box<RigConfig>>,
 }
 
 impl Rig {
@@ -140,6 +146,9 @@ impl Rig {
             truth: [0.0; CHANNELS],
             coil_pulses_s: Vec::new(),
             last_hit: None,
+            total: (0, 0),
+            drifted: None,
+            stepping,
             config: config.clone(),
         };
         let (impact, response) = (rig.impact.clone(), rig.response.clone());
@@ -195,10 +204,23 @@ impl Rig {
         let seen = self.config.response(configuration, response)?;
         let words = [configuration.as_str(), impact, response];
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
-        let plant = &self.plants[configuration as usize];
-        let (stepper, slipping) = plant.aimed(&self.config, &self.flaws, &aim, &self.channels)?;
         let speckle = seen.speckle;
-        self.direct = plant.direct(&self.config, &self.flaws, &aim);
+        let drifted = (configuration == Configuration::Ajb && self.config.contact.drifts()).then(|| {
+            let contact = self.config.contact.drifted(self.total.1, self.time_s(self.total.0));
+            Box::new(RigConfig { contact, ..self.config.clone() })
+        });
+        let config = drifted.as_deref().unwrap_or(&self.config);
+        let fresh = match &drifted {
+            Some(config) => Some(Plant::new(config, configuration, self.stepping, self.period_s)?),
+            None => None,
+        };
+        let plant = fresh.as_ref().unwrap_or(&self.plants[configuration as usize]);
+        let (stepper, slipping) = plant.aimed(config, &self.flaws, &aim, &self.channels)?;
+        self.direct = plant.direct(config, &self.flaws, &aim);
+        if let Some(fresh) = fresh {
+            self.plants[configuration as usize] = fresh;
+        }
+        self.drifted = drifted;
         self.aim = aim;
         self.stepper = stepper;
         self.slipping = slipping;
@@ -242,6 +264,7 @@ impl Rig {
         self.scans = 0;
         self.coil_pulses_s.push(pulse_s);
         self.last_hit = Some(hit);
+        self.total.1 += 1;
         self.attempt = attempt.wrapping_add(1);
     }
 
@@ -315,6 +338,7 @@ impl Rig {
         }
         let (from_s, to_s) = (self.time_s(self.scans), self.time_s(self.scans + 1));
         self.scans += 1;
+        self.total.0 += 1;
         let shaker_n = self.drive_v * self.config.shaker.gain_n_per_v;
         let forces = ScanForces { from_s, to_s, hammer: &self.pending, shaker_n };
         match &mut self.slipping {
@@ -347,6 +371,11 @@ impl Rig {
             let [codes, lower] = [codes, lower].map(|words| words.get_mut(CHANNELS..).unwrap_or_default());
             self.fixed.convert(read, codes, lower);
         }
+    }
+
+    /// The rig with the contact of this cell.
+    fn current(&self) -> &RigConfig {
+        self.drifted.as_deref().unwrap_or(&self.config)
     }
 
     fn time_s(&self, scans: u64) -> f64 {
@@ -393,13 +422,13 @@ impl Rig {
     /// Current mechanical energy of the structure (J).
     pub fn energy_j(&self) -> f64 {
         let plant = &self.plants[self.configuration as usize];
-        plant.energy_j(&self.config.contact, &self.stepper, self.slipping.as_ref())
+        plant.energy_j(self.current(), &self.stepper, self.slipping.as_ref())
     }
 
     /// Current state of the joint; `None` outside the assembly.
     pub fn joint(&self) -> Option<JointState> {
         let plant = &self.plants[self.configuration as usize];
-        plant.joint_state(&self.config.contact, &self.stepper, self.slipping.as_ref())
+        plant.joint_state(self.current(), &self.stepper, self.slipping.as_ref())
     }
 
     /// Current true displacement (m) and velocity (m/s) along a probe; `None` if its body is not

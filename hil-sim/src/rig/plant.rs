@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
-use super::config::{BodyName, Contact, ContactLaw, FixedQuantity, FixedSensor, RigConfig};
+use super::config::{BodyName, ContactLaw, FixedQuantity, FixedSensor, RigConfig};
 use super::modal::StateSpace;
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
@@ -85,12 +85,22 @@ impl Plant {
         let [x, y, z] = &aim.response;
         let seen = |probe| velocity(probe).ok_or_else(|| missing(probe));
         let sliding = config.contact.sliding();
-        let spot = |spot| velocity(&Probe::at(spot, sliding)).unwrap_or_else(nothing);
-        // A load cell's signal is its spring force kz · z on the body that it supports.
+        let errors = config.errors.acting();
+        let spot =
+            |name, spot| velocity(&Probe::at(spot, errors.tilted(name, sliding))).unwrap_or_else(nothing);
+        // A load cell's signal is its spring force kz · z on the body that it supports, with z
+        // relative to the body that it stands on.
+        let cells = self.structure.load_cells(config);
         let cell = |index: usize| {
             let it = &config.load_cells[index];
             let probe = |body| Probe { body, position_m: it.position_m, direction: AXES[2] };
-            let row = config.load_cells_on().and_then(|body| self.structure.row(&probe(body)));
+            let row = cells.and_then(|(from, to)| {
+                let row = self.structure.row(&probe(to))?;
+                Some(match from {
+                    Some(from) => row - self.structure.row(&probe(from))?,
+                    None => row,
+                })
+            });
             let row = row.map(|row| self.space.displacement(&row));
             row.unwrap_or_else(nothing) * it.stiffness_n_per_m[2]
         };
@@ -109,8 +119,8 @@ impl Plant {
                 seen(x)?,
                 seen(y)?,
                 seen(z)?,
-                spot(&flaws.spots.ldv_a),
-                spot(&flaws.spots.ldv_b),
+                spot("ldv_a", &flaws.spots.ldv_a),
+                spot("ldv_b", &flaws.spots.ldv_b),
                 cell(0),
                 cell(1),
                 cell(2),
@@ -119,7 +129,7 @@ impl Plant {
             // Without its body the shaker excites nothing.
             shaker: self.structure.row(&pushed).map_or_else(nothing, |row| self.space.input(&row)),
             steps: std::array::from_fn(|signal| channels[FIRST_SIGNAL + signal].step()),
-            joint: self.joint(&config.contact),
+            joint: self.joint(config),
             fixed: FixedRows {
                 rows: config.sensors.fixed.iter().zip(&flaws.fixed).map(fixed).collect(),
                 steps: channels[CHANNELS..].iter().map(Channel::step).collect(),
@@ -157,7 +167,7 @@ impl Plant {
             Probe { body: shaker.body, position_m: shaker.position_m, direction: config.contact.sliding() };
         let hammer = input(self.structure.row(&aim.impact));
         let shaker = input(self.structure.row(&pushed));
-        let joint = self.joint(&config.contact).map_or_else(nothing, |joint| joint.column);
+        let joint = self.joint(config).map_or_else(nothing, |joint| joint.column);
         let one = |(own, flaw): (&FixedSensor, &FixedFlaw)| match own.quantity {
             FixedQuantity::Velocity => Direct::default(),
             FixedQuantity::Acceleration => {
@@ -173,11 +183,12 @@ impl Plant {
     }
 
     /// The joint, if there is one that can slip.
-    fn joint(&self, contact: &Contact) -> Option<Joint> {
+    fn joint(&self, config: &RigConfig) -> Option<Joint> {
+        let contact = &config.contact;
         if contact.law == ContactLaw::Linear {
             return None;
         }
-        let row = self.relative(contact)?;
+        let row = self.relative(config)?;
         // The factor 1 - 1e-9 keeps rounding from increasing an exact integer quotient.
         let steps = (self.period_s / contact.slip_step_s * (1.0 - 1e-9)).ceil().max(1.0);
         Some(Joint {
@@ -190,10 +201,9 @@ impl Plant {
 
     /// Row of the structure for specimen A's motion minus B's along the sliding direction at the
     /// contact; `None` outside the assembly.
-    fn relative(&self, contact: &Contact) -> Option<DVector<f64>> {
-        let at = |body| {
-            self.structure.row(&Probe { body, position_m: contact.position_m, direction: contact.sliding() })
-        };
+    fn relative(&self, config: &RigConfig) -> Option<DVector<f64>> {
+        let (position_m, direction) = (config.contact_m(), config.contact.sliding());
+        let at = |body| self.structure.row(&Probe { body, position_m, direction });
         let [a, b] = self.joined;
         Some(at(a)? - at(b)?)
     }
@@ -201,11 +211,12 @@ impl Plant {
     /// Current state of the joint; `None` outside the assembly.
     pub(super) fn joint_state(
         &self,
-        contact: &Contact,
+        config: &RigConfig,
         stepper: &Stepper,
         slipping: Option<&Slipping>,
     ) -> Option<JointState> {
-        let row = self.relative(contact)?;
+        let contact = &config.contact;
+        let row = self.relative(config)?;
         let x = stepper.state();
         let relative_m = self.space.displacement(&row).dot(&x);
         let Some(sliders) = slipping.map(Slipping::sliders) else {
@@ -230,12 +241,12 @@ impl Plant {
         })
     }
 
-    pub(super) fn energy_j(&self, contact: &Contact, stepper: &Stepper, slipping: Option<&Slipping>) -> f64 {
+    pub(super) fn energy_j(&self, config: &RigConfig, stepper: &Stepper, slipping: Option<&Slipping>) -> f64 {
         let x = stepper.state();
         let stuck_j = self.space.energy_j(&x);
-        let (Some(slipping), Some(row)) = (slipping, self.relative(contact)) else { return stuck_j };
+        let (Some(slipping), Some(row)) = (slipping, self.relative(config)) else { return stuck_j };
         let relative_m = self.space.displacement(&row).dot(&x);
-        stuck_j - 0.5 * contact.stiffness_n_per_m[2] * relative_m * relative_m
+        stuck_j - 0.5 * config.contact.stiffness_n_per_m[2] * relative_m * relative_m
             + slipping.sliders().stored_j(relative_m)
     }
 

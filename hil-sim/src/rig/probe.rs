@@ -112,7 +112,7 @@ impl Aim {
         let mut hit_point = stream(seed, &["impact position", hit]);
         let mut seen_point = stream(seed, &["response position", seen]);
         let hit_m = shifted(
-            shifted(impact.position_m, errors.position_m, &mut hit_point),
+            shifted(errors.moved(hit, impact.position_m), errors.position_m, &mut hit_point),
             errors.aim_m,
             &mut impact_aim,
         );
@@ -123,13 +123,21 @@ impl Aim {
         };
         let own_m = response.sigma_m.filter(|_| !errors.none);
         let seen_sigma_m = own_m.unwrap_or(seen_sigma_m);
-        let seen_m =
-            shifted(shifted(response.position_m, seen_sigma_m, &mut seen_point), aim_m, &mut response_aim);
+        let seen_m = shifted(
+            shifted(errors.moved(seen, response.position_m), seen_sigma_m, &mut seen_point),
+            aim_m,
+            &mut response_aim,
+        );
         let mut hammer = stream(seed, &["hammer angle", hit]);
-        let direction = tilted(impact.probe().direction, errors.hammer_angle_rad, &mut hammer);
+        let stated = errors.tilted("hammer", impact.probe().direction);
+        let direction = tilted(stated, errors.hammer_angle_rad, &mut hammer);
         Self {
             impact: Probe { body: impact.body, position_m: hit_m, direction },
-            response: AXES.map(|axis| Probe { body: response.body, position_m: seen_m, direction: axis }),
+            response: AXES.map(|axis| Probe {
+                body: response.body,
+                position_m: seen_m,
+                direction: errors.tilted("vibrometer", axis),
+            }),
         }
     }
 }

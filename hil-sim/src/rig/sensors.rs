@@ -320,8 +320,8 @@ fn fixed_flaws(seed: u64, config: &RigConfig) -> Vec<FixedFlaw> {
         Some(FixedFlaw {
             probe: Probe {
                 body: point.body,
-                position_m: shifted(point.position_m, sigma_m, &mut place),
-                direction: sensitive(own, errors.transverse, seed),
+                position_m: shifted(errors.moved(&point.name, point.position_m), sigma_m, &mut place),
+                direction: errors.tilted(&own.name, sensitive(own, errors.transverse, seed)),
             },
             gain: stated * (1.0 + errors.gain * draw("gain")),
             skew_s: errors.skew_s * draw("skew"),
@@ -494,7 +494,7 @@ impl Flaws {
         let spot = |name: &str, nominal: &Spot| Spot {
             body: nominal.body,
             position_m: shifted(
-                nominal.position_m,
+                errors.moved(name, nominal.position_m),
                 errors.spot_m,
                 &mut stream(seed, &["spot position", name]),
             ),

@@ -68,14 +68,14 @@ impl Structure {
             }
         }
         if configuration == Configuration::Ajb {
-            let [a, b] = own.joint;
-            structure.connect_along(Some(a), Some(b), &config.contact.bushing(), config.contact.axes);
+            structure.join(config);
         }
-        if let Some(held) = own.load_cells_on.filter(|body| config.has(configuration, *body)) {
+        if let Some((from, to)) = structure.load_cells(config) {
             for cell in &config.load_cells {
-                structure.connect(None, Some(held), cell);
+                structure.connect(from, Some(to), cell);
             }
         }
+        structure.add_paths(config);
         structure.carry_sensors(config);
         structure
     }
@@ -145,6 +145,7 @@ impl Structure {
             structure.mass += lever.transpose() * body_mass(&bodies.specimen_a) * lever;
         }
         structure.support(config);
+        structure.add_paths(config);
         structure.carry_sensors(config);
         structure
     }
@@ -168,6 +169,34 @@ impl Structure {
         }
     }
 
+    /// Adds the contact.
+    pub(super) fn join(&mut self, config: &RigConfig) {
+        let [a, b] = config.joined().map(Some);
+        for bushing in config.contact_bushings() {
+            self.connect_along(a, b, &bushing, config.contact.axes);
+        }
+    }
+
+    /// Adds the paths whose bodies are all present.
+    fn add_paths(&mut self, config: &RigConfig) {
+        let configuration = self.configuration;
+        for path in config.paths.iter().filter(|path| path.present.contains(&configuration)) {
+            let ends = path.ends();
+            if ends.iter().flatten().all(|body| self.find(*body).is_some()) {
+                self.connect_along(ends[0], ends[1], &path.bushing(), path.axes);
+            }
+        }
+    }
+
+    /// The load cells' ends, of which the first may be the ground (`None`), if this configuration
+    /// has them.
+    pub(super) fn load_cells(&self, config: &RigConfig) -> Option<(Option<BodyName>, BodyName)> {
+        let [from, to] = config.load_cells_join()?;
+        let from = (from != BodyName::GROUND).then_some(from);
+        let there = from.into_iter().chain([to]).all(|body| self.find(body).is_some());
+        there.then_some((from, to))
+    }
+
     fn support(&mut self, config: &RigConfig) {
         let configuration = self.configuration;
         let in_a = configuration == Configuration::A;
@@ -187,8 +216,7 @@ impl Structure {
             }
         }
         if configuration == Configuration::Ajb {
-            let (ends, contact) = (config.joined().map(Some), &config.contact);
-            self.connect_along(ends[0], ends[1], &contact.bushing(), contact.axes);
+            self.join(config);
         }
         if configuration != Configuration::A {
             if !config.clamp_b.rigid {
@@ -388,7 +416,7 @@ impl Body {
             _ => return self.bending(beam, mass_kg, &[]),
         };
         let clamp_m = clamp_of(clamp, configuration).position_m;
-        let bending = self.bending(beam, mass_kg, &[clamp_m, config.contact.position_m]);
+        let bending = self.bending(beam, mass_kg, &[clamp_m, config.contact_m()]);
         Self { held: clamp.rigid.then_some((arm, clamp_m)), ..bending }
     }
 

@@ -14,7 +14,8 @@ const SMALLEST_OF_LARGEST: f64 = 1e-14;
 /// Both virtual points (m): the rig's origin.
 const VIRTUAL_POINT_M: [f64; 3] = [0.0; 3];
 
-/// The stiffnesses along z that follow from a rig's parameters.
+/// The stiffnesses along z that follow from a rig's parameters; of a contact that drifts, at the
+/// start. Paths beside the contact are not part of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
@@ -40,7 +41,7 @@ impl RigConfig {
     /// The values that an ideal measurement would find. The clamps are those of the assembly, under
     /// load.
     pub fn truth(&self) -> Truth {
-        let contact = self.compliance(&self.contact.bushing(), self.contact.axes);
+        let contact = self.contact_compliance();
         if let Some(own) = &self.structure {
             let all = self.between_arms(own);
             // in series with the contact; a parallel path stiffens the result, and then no
@@ -77,8 +78,7 @@ impl RigConfig {
                 inner.connect_along(Some(from), Some(to), &spring.bushing(), spring.axes);
             }
         }
-        let [from, to] = own.joint.map(Some);
-        inner.connect_along(from, to, &self.contact.bushing(), self.contact.axes);
+        inner.join(self);
         self.pulled(&inner, arm)
     }
 
@@ -103,8 +103,7 @@ impl RigConfig {
                 inner.connect_along(arm, Some(specimen), &clamp.loaded, None);
             }
         }
-        let [from, to] = self.joined().map(Some);
-        inner.connect_along(from, to, &self.contact.bushing(), self.contact.axes);
+        inner.join(self);
         self.pulled(&inner, BodyName::ArmA)
     }
 
@@ -128,6 +127,19 @@ impl RigConfig {
         let largest = parts.singular_values.max();
         let answer = parts.solve(&pull, largest * SMALLEST_OF_LARGEST);
         answer.map_or(f64::NAN, |motion| motion.dot(&pull))
+    }
+
+    /// Compliance of the contact at the virtual point along the sliding direction.
+    fn contact_compliance(&self) -> f64 {
+        if let [one] = self.contact_bushings().as_slice() {
+            return self.compliance(one, self.contact.axes);
+        }
+        // patches in parallel: one massless body on them
+        let [a, _] = self.joined();
+        let body = vec![Body::new(a, VIRTUAL_POINT_M)];
+        let mut patches = Structure::empty(Configuration::Ajb, body, [false, false]);
+        patches.join(self);
+        self.pulled(&patches, a)
     }
 
     /// Compliance of a bushing at the virtual point along the sliding direction: the sum over its

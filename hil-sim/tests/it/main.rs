@@ -1,6 +1,7 @@
 //! Integration tests of the simulator, one program so that it is linked once.
 
 mod board;
+mod broken_assumptions;
 mod clamp_b;
 mod config;
 mod console;

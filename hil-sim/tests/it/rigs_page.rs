@@ -62,9 +62,20 @@ fn the_page_and_the_rig_have_the_same_fields() {
     fields("", &toml::from_str(ACCELEROMETERS).unwrap(), &mut known);
     fields("", &toml::from_str(ELASTIC).unwrap(), &mut known);
     // fields that the examples omit: every spring is in all configurations, there is no load cell,
-    // the converters have 16 bits, sections are aligned with the rig, own bodies are rigid
+    // the converters have 16 bits, sections are aligned with the rig, own bodies are rigid, and
+    // nothing is off except what is drawn
     known.extend(
         [
+            "contact.drift_per_hit",
+            "contact.drift_per_s",
+            "contact.patches.offset_m",
+            "contact.patches.share",
+            "errors.offset_m",
+            "errors.tilt_rad",
+            "paths.axes",
+            "paths.between",
+            "paths.in",
+            "structure.load_cells_between",
             "structure.springs.in",
             "structure.load_cells_on",
             "sensors.bits",

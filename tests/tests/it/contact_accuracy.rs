@@ -153,6 +153,7 @@ const MAY_SLIP: Drawn = Drawn {
     errors: 1.0,
     gain: 0.005,
     accelerometers: false,
+    elastic: None,
 };
 
 /// From rig number `first` on, the first `each` rigs that slip under the hammer, and the first

@@ -4,9 +4,10 @@
 
 use super::{
     Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side,
+    Spring,
 };
-use crate::rig::RigError;
 use crate::rig::channels::{CHANNELS, FORCE, channels};
+use crate::rig::RigError;
 use jointrig_protocol::channel::{NARROW_BITS, WIDE_BITS};
 use jointrig_protocol::limits::MAX_CHANNELS;
 use nalgebra::Vector3;
@@ -18,6 +19,10 @@ use toml::de::{DeTable, DeValue};
 const MOST_SLIP_STEPS: f64 = 1000.0;
 /// Minimum stiffness of a contact, N/m: a smaller value was probably given in N/µm or N/mm.
 const SOFTEST_N_PER_M: f64 = 1e4;
+/// Largest stated distance (m) of a true position from the stated one.
+const LARGEST_OFFSET_M: f64 = 0.05;
+/// Largest tilt (rad).
+const LARGEST_TILT_RAD: f64 = 0.5;
 /// Minimum length of a beam over the largest edge of its section: shorter, its sections are not
 /// plane.
 const SHORTEST_BEAM: f64 = 0.25;
@@ -69,6 +74,20 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
         bushing(&format!("load_cells[{index}]"), cell)?;
     }
     bushing("lower_push_rod", &config.lower_push_rod)?;
+    for (index, path) in config.paths.iter().enumerate() {
+        let field = format!("paths[{index}]");
+        spring(&field, path)?;
+        let missing = |end: &BodyName| match &config.structure {
+            Some(own) => own.body(*end).is_none(),
+            None => matches!(end, BodyName::Own(_)),
+        };
+        if let Some(end) = path.ends().into_iter().flatten().find(missing) {
+            return Err(bad(
+                &format!("{field}.between"),
+                &format!("names {end}, which the rig does not have"),
+            ));
+        }
+    }
     points(config)?;
     hammer(config)?;
     sensors(config)?;
@@ -102,6 +121,38 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
         }
         if !volts.is_finite() || *volts == 0.0 {
             return Err(bad(&format!("errors.volts.{name}"), "must be a number, and not zero"));
+        }
+    }
+    let points = || {
+        let named = config.responses.iter().map(|point| &point.name);
+        named.chain(config.impacts.iter().map(|point| &point.name))
+    };
+    for (name, offset_m) in &errors.offset_m {
+        let field = format!("errors.offset_m.{name}");
+        finite(&field, offset_m)?;
+        if !["contact", "ldv_a", "ldv_b"].contains(&name.as_str()) && !points().any(|point| point == name) {
+            return Err(bad(&field, "is not contact, ldv_a, ldv_b, or a response or impact point"));
+        }
+        if offset_m.iter().any(|offset| offset.abs() > LARGEST_OFFSET_M) {
+            return Err(bad(
+                &field,
+                &format!("is more than {LARGEST_OFFSET_M} m: the unit is m, 2e-4 for 0.2 mm"),
+            ));
+        }
+    }
+    for (name, tilt) in &errors.tilt_rad {
+        let field = format!("errors.tilt_rad.{name}");
+        finite(&field, tilt)?;
+        let known = ["ldv_a", "ldv_b", "vibrometer", "hammer"].contains(&name.as_str())
+            || config.sensors.fixed.iter().any(|own| &own.name == name);
+        if !known {
+            return Err(bad(&field, "is not ldv_a, ldv_b, vibrometer, hammer or a fixed sensor"));
+        }
+        if tilt.iter().any(|angle| angle.abs() > LARGEST_TILT_RAD) {
+            return Err(bad(
+                &field,
+                &format!("is more than {LARGEST_TILT_RAD} rad: the unit is rad, 0.035 for 2°"),
+            ));
         }
     }
     if errors.skew_s * f64::from(config.scan_rate_hz) > 1e3 {
@@ -152,6 +203,41 @@ fn contact(config: &RigConfig) -> Result<(), RigError> {
         ));
     }
     fraction("contact.iwan.spread", contact.iwan.spread)?;
+    for (index, patch) in contact.patches.iter().enumerate() {
+        let field = |name: &str| format!("contact.patches[{index}].{name}");
+        finite(&field("offset_m"), &patch.offset_m)?;
+        if patch.offset_m.iter().any(|offset| offset.abs() > LARGEST_OFFSET_M) {
+            return Err(bad(
+                &field("offset_m"),
+                &format!("is more than {LARGEST_OFFSET_M} m: the unit is m"),
+            ));
+        }
+        positive(&field("share"), patch.share)?;
+    }
+    if !contact.patches.is_empty() {
+        let sum: f64 = contact.patches.iter().map(|patch| patch.share).sum();
+        if (sum - 1.0).abs() > 1e-9 {
+            return Err(bad("contact.patches", &format!("have shares that sum to {sum}, not to 1")));
+        }
+        if contact.law != ContactLaw::Linear {
+            return Err(bad(
+                "contact.patches",
+                "are not possible for a contact that can slip: its law must be linear",
+            ));
+        }
+    }
+    finite("contact.drift_per_hit", &[contact.drift_per_hit])?;
+    finite("contact.drift_per_s", &[contact.drift_per_s])?;
+    for (field, drift) in
+        [("contact.drift_per_hit", contact.drift_per_hit), ("contact.drift_per_s", contact.drift_per_s)]
+    {
+        if drift.abs() > 0.1 {
+            return Err(bad(
+                field,
+                &format!("is {drift}: more than 0.1, that is 10 %, for each hit or second"),
+            ));
+        }
+    }
     if contact.law != ContactLaw::Linear && contact.stiffness_n_per_m[2] <= 0.0 {
         return Err(bad(
             "contact.stiffness_n_per_m",
@@ -521,21 +607,10 @@ fn bodies_and_springs(own: &OwnStructure) -> Result<(), RigError> {
     }
     for (index, it) in own.springs.iter().enumerate() {
         let field = format!("structure.springs[{index}]");
-        bushing(&field, &it.bushing())?;
-        axes(&format!("{field}.axes"), it.axes)?;
-        let ends = it.ends();
-        for end in ends.into_iter().flatten() {
+        for end in it.ends().into_iter().flatten() {
             known(own, &format!("{field}.between"), end)?;
         }
-        if ends[0] == ends[1] {
-            return Err(bad(
-                &format!("{field}.between"),
-                "has one body twice: name two, or `ground` and one",
-            ));
-        }
-        if it.present.is_empty() {
-            return Err(bad(&format!("{field}.in"), "is empty: name A, B or AJB, or leave it out for all"));
-        }
+        spring(&field, it)?;
     }
     for (field, pair) in [("structure.joint", own.joint), ("structure.arms", own.arms)] {
         for (name, side) in pair.into_iter().zip([Side::A, Side::B]) {
@@ -551,6 +626,30 @@ fn bodies_and_springs(own: &OwnStructure) -> Result<(), RigError> {
     }
     if let Some(held) = own.load_cells_on {
         known(own, "structure.load_cells_on", held)?;
+    }
+    if let Some([from, to]) = own.load_cells_between {
+        let field = "structure.load_cells_between";
+        known(own, field, from)?;
+        known(own, field, to)?;
+        if from == to {
+            return Err(bad(field, "has one body twice: name two"));
+        }
+        if own.load_cells_on.is_some() {
+            return Err(bad(field, "and load_cells_on exclude each other: remove one of them"));
+        }
+    }
+    Ok(())
+}
+
+fn spring(field: &str, spring: &Spring) -> Result<(), RigError> {
+    bushing(field, &spring.bushing())?;
+    axes(&format!("{field}.axes"), spring.axes)?;
+    let ends = spring.ends();
+    if ends[0] == ends[1] {
+        return Err(bad(&format!("{field}.between"), "has one body twice: name two, or `ground` and one"));
+    }
+    if spring.present.is_empty() {
+        return Err(bad(&format!("{field}.in"), "is empty: name A, B or AJB, or leave it out for all"));
     }
     Ok(())
 }

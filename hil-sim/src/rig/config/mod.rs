@@ -5,7 +5,7 @@
 //! merge into the default's, its lists replace the default's lists.
 
 use super::{Configuration, RigError, normalized};
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -50,6 +50,10 @@ pub struct RigConfig {
     pub load_cells: Vec<Bushing>,
     /// Ground to arm B.
     pub lower_push_rod: Bushing,
+    /// Further connections between two bodies or from a body to the ground, such as a cable that
+    /// bypasses the contact in the assembly; none in the default rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub paths: Vec<Spring>,
     /// Points at which the 3-D vibrometer can measure.
     pub responses: Vec<ResponsePoint>,
     /// Points that the hammer can hit.
@@ -116,9 +120,34 @@ impl RigConfig {
         self.structure.as_ref().map_or([BodyName::SpecimenA, BodyName::SpecimenB], |own| own.joint)
     }
 
-    /// The body that the load cells support; `None` without load cells.
-    pub fn load_cells_on(&self) -> Option<BodyName> {
-        self.structure.as_ref().map_or(Some(BodyName::ArmB), |own| own.load_cells_on)
+    /// The load cells' two ends, of which the first may be the ground (`ground`); `None` without
+    /// load cells.
+    pub(super) fn load_cells_join(&self) -> Option<[BodyName; 2]> {
+        let on = |body| [BodyName::GROUND, body];
+        match &self.structure {
+            None => Some(on(BodyName::ArmB)),
+            Some(own) => own.load_cells_between.or(own.load_cells_on.map(on)),
+        }
+    }
+
+    /// The true position of the contact's centre (m).
+    pub(super) fn contact_m(&self) -> [f64; 3] {
+        self.errors.acting().moved("contact", self.contact.position_m)
+    }
+
+    /// The stuck contact's springs and dashpots at their true positions: one, or its patches.
+    pub(super) fn contact_bushings(&self) -> Vec<Bushing> {
+        let (whole, centre_m) = (self.contact.bushing(), self.contact_m());
+        if self.contact.patches.is_empty() {
+            return vec![Bushing { position_m: centre_m, ..whole }];
+        }
+        let patch = |patch: &Patch| Bushing {
+            position_m: std::array::from_fn(|axis| centre_m[axis] + patch.offset_m[axis]),
+            stiffness_n_per_m: whole.stiffness_n_per_m.map(|k| k * patch.share),
+            rotation_nm_per_rad: whole.rotation_nm_per_rad.map(|k| k * patch.share),
+            damping_s: whole.damping_s,
+        };
+        self.contact.patches.iter().map(patch).collect()
     }
 
     /// Checks every value, as [`RigConfig::from_toml`] does; for rigs that were changed in code.
@@ -439,9 +468,50 @@ pub struct Contact {
     /// if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<[[f64; 3]; 3]>,
+    /// Parts of a contact that does not touch at one place; a contact that can slip has none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub patches: Vec<Patch>,
+    /// Relative increase of all its stiffnesses for each hit since the rig was started. It takes
+    /// effect when a cell of the assembly is staged.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub drift_per_hit: f64,
+    /// The same for each second of scans (1/s).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub drift_per_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// A part of the contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Patch {
+    /// Its position relative to the contact's (m).
+    pub offset_m: [f64; 3],
+    /// Its part of the contact's stiffnesses; the parts sum to one.
+    pub share: f64,
 }
 
 impl Contact {
+    /// Whether its stiffness changes while the rig runs.
+    pub fn drifts(&self) -> bool {
+        self.drift_per_hit != 0.0 || self.drift_per_s != 0.0
+    }
+
+    /// The contact after these hits and seconds; not softer than a twentieth of the stated one.
+    #[must_use]
+    pub fn drifted(&self, hits: u64, seconds: f64) -> Self {
+        let factor = (1.0 + self.drift_per_hit * hits as f64 + self.drift_per_s * seconds).max(0.05);
+        Self {
+            stiffness_n_per_m: self.stiffness_n_per_m.map(|k| k * factor),
+            rotation_nm_per_rad: self.rotation_nm_per_rad.map(|k| k * factor),
+            ..self.clone()
+        }
+    }
+
     /// Each slider's fraction of μN, the weakest first; empty for the linear law. They share the
     /// stiffness evenly.
     pub fn shares(&self) -> Vec<f64> {
@@ -468,8 +538,8 @@ impl Contact {
     }
 }
 
-/// Standard deviations of errors that are drawn from the rig's seed; the last three are not drawn
-/// but given directly.
+/// Standard deviations of errors that are drawn from the rig's seed; those from
+/// `normal_load_variation` on are not drawn but given directly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
@@ -508,6 +578,14 @@ pub struct Errors {
     /// drawn errors; negative for a reversed sensor.
     #[serde(default)]
     pub volts: BTreeMap<String, f64>,
+    /// Distance (m) of a true position from the stated one, by the name of a response or impact
+    /// point, `ldv_a`, `ldv_b` or `contact`, on top of the drawn errors.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub offset_m: BTreeMap<String, [f64; 3]>,
+    /// Rotation vector (rad, about x, y and z) from stated to true directions: of `ldv_a`, `ldv_b`,
+    /// the three axes of `vibrometer`, all impacts of the `hammer`, or a fixed sensor by its name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub tilt_rad: BTreeMap<String, [f64; 3]>,
 }
 
 impl Errors {
@@ -532,7 +610,21 @@ impl Errors {
             normal_load_variation: 0.0,
             normal_load_reference_m: self.normal_load_reference_m,
             volts: BTreeMap::new(),
+            offset_m: BTreeMap::new(),
+            tilt_rad: BTreeMap::new(),
         }
+    }
+
+    /// The true position of what `name` names, without drawn errors.
+    pub(super) fn moved(&self, name: &str, stated_m: [f64; 3]) -> [f64; 3] {
+        let offset_m = self.offset_m.get(name).copied().unwrap_or_default();
+        std::array::from_fn(|axis| stated_m[axis] + offset_m[axis])
+    }
+
+    /// The true direction of what `name` names, without drawn errors.
+    pub(super) fn tilted(&self, name: &str, stated: [f64; 3]) -> [f64; 3] {
+        let Some(tilt) = self.tilt_rad.get(name) else { return stated };
+        (Rotation3::new(Vector3::from(*tilt)) * Vector3::from(stated)).into()
     }
 
     /// Relative increase of the normal load per metre of relative displacement (1/m).

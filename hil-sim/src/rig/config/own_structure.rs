@@ -17,6 +17,10 @@ pub struct OwnStructure {
     /// The body that the three load cells support; `None` without load cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_cells_on: Option<BodyName>,
+    /// The two bodies between which the load cells are, instead: each reads its spring force, kz
+    /// times the second body's motion along z minus the first's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_cells_between: Option<[BodyName; 2]>,
     /// The bodies.
     pub bodies: Vec<OwnBody>,
     /// Supports and connections.
