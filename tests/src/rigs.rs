@@ -345,9 +345,9 @@ mod tests {
             assert_eq!(rig.fallback(), None, "{number}");
             let steel = bends.bodies.specimen_a.beam.as_ref().unwrap().young_pa > 1e11;
             if steel {
-                stiff += 1
+                stiff += 1;
             } else {
-                soft += 1
+                soft += 1;
             }
             let (rigid_truth, truth) = (rigid.truth(), bends.truth());
             assert_eq!(rigid_truth.contact_k_t_n_per_m, truth.contact_k_t_n_per_m);

@@ -27,7 +27,7 @@ fn spots() -> [Probe; 2] {
 
 fn frf(config: &RigConfig, hz: f64) -> DMatrix<Complex<f64>> {
     let s = [Complex::new(0.0, TAU * hz)];
-    let inputs = ["AZ3", "BZ3"].map(|name| config.impact(Configuration::Ajb, name).unwrap().probe());
+    let inputs = ["AZ1", "BZ1"].map(|name| config.impact(Configuration::Ajb, name).unwrap().probe());
     exact_frf(config, Configuration::Ajb, Quantity::Receptance, &s, &spots(), &inputs).unwrap().remove(0)
 }
 
@@ -137,7 +137,7 @@ fn a_contact_in_patches_is_its_parts() {
     for hz in [100.0, 300.0, 700.0] {
         let (found, expected) = (frf(&split, hz), frf(&stiffer, hz));
         assert!((&found - &expected).norm() < 1e-9 * expected.norm(), "{hz}");
-        assert!((&found - frf(&one, hz)).norm() > 1e-3 * expected.norm(), "{hz}");
+        assert!((&found - frf(&one, hz)).norm() > 1e-4 * expected.norm(), "{hz}");
     }
     assert_eq!(split.truth().contact_k_t_n_per_m, one.truth().contact_k_t_n_per_m);
     assert_eq!(RigConfig::from_toml(&split.to_toml()).unwrap(), split);

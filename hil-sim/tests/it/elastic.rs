@@ -1,7 +1,7 @@
 //! Rigs whose bodies bend.
 #![allow(clippy::unwrap_used)]
 
-use jointrig_hil_sim::rig::config::{Beam, BodyName, OwnName, RigConfig, Side};
+use jointrig_hil_sim::rig::config::{Beam, BodyName, ImpactPoint, OwnName, ResponsePoint, RigConfig, Side};
 use jointrig_hil_sim::rig::config::{OwnBody, OwnStructure, Spring};
 use jointrig_hil_sim::rig::structure::Structure;
 use jointrig_hil_sim::rig::{CHANNELS, Configuration, Probe, Quantity, Rig, exact_frf};
@@ -25,11 +25,11 @@ fn beams(config: &mut RigConfig) -> [&mut Option<Beam>; 4] {
 fn frfs(config: &RigConfig, configuration: Configuration, hz: &[f64]) -> Vec<DMatrix<Complex<f64>>> {
     let there = |body| config.has(configuration, body);
     let points = config.responses.iter().filter(|point| there(point.body));
-    let mut outputs: Vec<_> = points.flat_map(|point| point.probes()).collect();
+    let mut outputs: Vec<_> = points.flat_map(ResponsePoint::probes).collect();
     let spots = [&config.spots.ldv_a, &config.spots.ldv_b];
     outputs.extend(spots.into_iter().filter(|spot| there(spot.body)).map(Probe::along_z));
     let inputs: Vec<_> =
-        config.impacts.iter().filter(|point| there(point.body)).map(|point| point.probe()).collect();
+        config.impacts.iter().filter(|point| there(point.body)).map(ImpactPoint::probe).collect();
     let s: Vec<_> = hz.iter().map(|hz| Complex::new(2.3, TAU * hz)).collect();
     exact_frf(config, configuration, Quantity::Mobility, &s, &outputs, &inputs).unwrap()
 }

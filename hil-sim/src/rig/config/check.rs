@@ -6,8 +6,8 @@ use super::{
     Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side,
     Spring,
 };
-use crate::rig::channels::{CHANNELS, FORCE, channels};
 use crate::rig::RigError;
+use crate::rig::channels::{CHANNELS, FORCE, channels};
 use jointrig_protocol::channel::{NARROW_BITS, WIDE_BITS};
 use jointrig_protocol::limits::MAX_CHANNELS;
 use nalgebra::Vector3;
