@@ -483,7 +483,8 @@ mod tests {
         let euler = |wave: f64, moment: f64| {
             wave * wave / (TAU * length * length) * (YOUNG * moment / line_kg_per_m).sqrt()
         };
-        // softer along the second edge; slender: shear and rotary inertia lower them by (h/L)² or so
+        // softer along the second edge; slender: shear and rotary inertia lower them by (h/L)² or
+        // so
         for (found, moment) in cantilever_hz(&beam).iter().zip([moments[1], moments[0]]) {
             let expected = euler(1.875_104_07, moment);
             assert!((found / expected - 1.0).abs() < 1e-3, "{found} Hz for {expected}");

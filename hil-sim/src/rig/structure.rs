@@ -48,6 +48,19 @@ impl Structure {
         self.bodies.iter().any(|body| body.elastic.is_some())
     }
 
+    /// Checks that all bodies that should bend do.
+    ///
+    /// # Errors
+    /// [`RigError::Structure`] if the modes of a beam could not be found: a beam that
+    /// [`RigConfig::check`] refuses.
+    pub fn complete(&self) -> Result<(), RigError> {
+        if self.bodies.iter().any(|body| body.lacks_modes) {
+            let what = "a beam has no modes: its length, section, material or mass is not possible";
+            return Err(RigError::Structure { configuration: self.configuration, what });
+        }
+        Ok(())
+    }
+
     /// A user-defined structure of any bodies and springs.
     fn of_its_own(config: &RigConfig, own: &OwnStructure, configuration: Configuration) -> Self {
         let bodies: Vec<_> = own.bodies.iter().filter(|body| config.has(configuration, body.name)).collect();
@@ -332,7 +345,7 @@ impl Structure {
     ///
     /// # Errors
     /// [`RigError::MissingBody`] for a probe on a body that is not present; [`RigError::Structure`]
-    /// if `s` is a pole.
+    /// if `s` is a pole, and as for [`Structure::complete`].
     pub fn frf(
         &self,
         s: Complex<f64>,
@@ -340,6 +353,7 @@ impl Structure {
         outputs: &[Probe],
         inputs: &[Probe],
     ) -> Result<DMatrix<Complex<f64>>, RigError> {
+        self.complete()?;
         let rows = self.rows(outputs)?;
         let columns = self.rows(inputs)?;
         let scale = self.scale();
@@ -386,6 +400,8 @@ pub(super) struct Body {
     /// Its first coordinate: six of rigid motion unless it is held, then one for each mode.
     at: usize,
     elastic: Option<Shapes>,
+    /// Whether it should bend, but its modes could not be found.
+    lacks_modes: bool,
     /// The body that holds it rigidly, and where.
     held: Option<(BodyName, [f64; 3])>,
 }
@@ -393,12 +409,13 @@ pub(super) struct Body {
 impl Body {
     /// A rigid body whose six coordinates are its motion at `cg`.
     pub(super) fn new(name: BodyName, cg: [f64; 3]) -> Self {
-        Self { name, cg, at: 0, elastic: None, held: None }
+        Self { name, cg, at: 0, elastic: None, lacks_modes: false, held: None }
     }
 
     /// The same as a beam of this mass, if one is given, with nodes at the points `loaded`.
     pub(super) fn bending(self, beam: Option<&Beam>, mass_kg: f64, loaded: &[[f64; 3]]) -> Self {
-        Self { elastic: beam.and_then(|beam| Shapes::new(beam, mass_kg, loaded)), ..self }
+        let elastic = beam.and_then(|beam| Shapes::new(beam, mass_kg, loaded));
+        Self { lacks_modes: beam.is_some() && elastic.is_none(), elastic, ..self }
     }
 
     /// The same for a body of the paper's rig. A specimen has nodes at its clamp and at the

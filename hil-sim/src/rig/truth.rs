@@ -110,7 +110,7 @@ impl RigConfig {
     /// Displacement along the sliding direction per force at the virtual point of `arm`.
     fn pulled(&self, inner: &Structure, arm: BodyName) -> f64 {
         let pull = Probe { body: arm, position_m: VIRTUAL_POINT_M, direction: self.contact.sliding() };
-        let Some(pull) = inner.row(&pull) else { return f64::NAN };
+        let Some(pull) = inner.row(&pull).filter(|_| inner.complete().is_ok()) else { return f64::NAN };
         let mut stiffness = inner.stiffness.clone();
         let mut pull = pull;
         if inner.bends() {

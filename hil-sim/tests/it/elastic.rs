@@ -306,4 +306,11 @@ fn an_impossible_beam_is_refused_with_its_field_and_line() {
     let heavy = format!("{ELASTIC}\n[bodies.specimen_b]\nmass_kg = 2.5\n");
     let error = RigConfig::from_toml(&heavy).unwrap_err().to_string();
     assert!(error.contains("bodies.specimen_b.mass_kg"), "{error}");
+    // a rig that is made in code and not checked is not taken for a rigid one
+    let mut unchecked = elastic();
+    unchecked.bodies.arm_b.beam.as_mut().unwrap().section_m = [0.0, 0.01];
+    let probes = unchecked.responses[4].probes();
+    let s = [Complex::new(0.0, TAU * 100.0)];
+    let frf = exact_frf(&unchecked, Configuration::B, Quantity::Mobility, &s, &probes, &probes);
+    assert!(frf.unwrap_err().to_string().contains("a beam has no modes"));
 }
