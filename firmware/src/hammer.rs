@@ -77,6 +77,7 @@ enum State {
 pub struct Hammer {
     rate_hz: u32,
     cap_us: u32,
+    pause_ms: u32,
     force: Option<usize>,
     units_per_code: UnitsPerCode,
     trigger: Trigger,
@@ -97,6 +98,7 @@ impl Hammer {
         Self {
             rate_hz,
             cap_us: cap_us.min(COIL_PULSE_CAP_US),
+            pause_ms: PAUSE_MS,
             force,
             units_per_code: as_built(channels),
             trigger: Trigger {
@@ -111,6 +113,12 @@ impl Hammer {
             rested_at: 0,
             coil_free_at: 0,
         }
+    }
+
+    /// Waits at least this long from the end of one pulse to the next, ms, and never less than
+    /// [`PAUSE_MS`].
+    pub(crate) fn pause_for(&mut self, pause_ms: u32) {
+        self.pause_ms = pause_ms.max(PAUSE_MS);
     }
 
     /// Uses these scales from now on.
@@ -337,7 +345,7 @@ impl Hammer {
                 shot.fired_at = end;
             }
             self.coil_free_at =
-                end + pulse_scans + u64::from(PAUSE_MS) * u64::from(self.rate_hz).div_ceil(1000);
+                end + pulse_scans + u64::from(self.pause_ms) * u64::from(self.rate_hz).div_ceil(1000);
             self.state =
                 State::Firing { contact_by: end + pulse_scans + u64::from(self.trigger.flight_scans) };
             return Outcome {

@@ -234,6 +234,11 @@ impl Safety<'_> {
         Ok(())
     }
 
+    /// Sets the shortest pause between two pulses of the coil, ms.
+    pub fn pause_for(&mut self, pause_ms: u32) {
+        self.hammer.pause_for(pause_ms);
+    }
+
     /// Sets how a shot's pulse is recognised.
     pub fn set_trigger(&mut self, trigger: Trigger) -> Result<(), Refusal> {
         self.hammer.set_trigger(trigger)

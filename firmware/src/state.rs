@@ -156,6 +156,19 @@ impl<'a, M: RawMutex> Core<'a, M> {
         self
     }
 
+    /// For a coil that needs a longer pause between two pulses than
+    /// [`crate::hammer::PAUSE_MS`], ms.
+    #[must_use]
+    pub fn with_coil_pause(self, pause_ms: u32) -> Self {
+        self.with(|state| state.safety.pause_for(pause_ms));
+        self
+    }
+
+    /// The hammer's state, for a board that reports it.
+    pub fn hammer(&self) -> answer::Hammer {
+        self.with(|state| state.safety.hammer().state())
+    }
+
     pub(crate) fn with<R>(&self, f: impl FnOnce(&mut State<'a>) -> R) -> R {
         self.state.lock(|state| f(&mut state.borrow_mut()))
     }
