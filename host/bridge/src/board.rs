@@ -1,10 +1,12 @@
 //! The device: the firmware's core over the scans of the queue, in a thread.
 //!
-//! A bridge has no coil, no drive and no stage. A PC cannot promise that an output is off, so it
-//! fires nothing: the longest coil pulse is 0 µs, the guard counts as open, and every order to
-//! move something is refused.
+//! A bridge has no drive and no stage. It has a coil only if the program announces one
+//! ([`crate::orders`]); otherwise the longest coil pulse is 0 µs, the guard counts as open, and
+//! every order to move something is refused. With a coil the guard counts as closed: no input of
+//! the bridge knows it, so guard and emergency stop must cut the coil's supply (docs/safety.md).
 
-use std::io::{BufReader, Read};
+use std::cell::RefCell;
+use std::io::{BufReader, Read, Write};
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -12,7 +14,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use heapless::String as Text;
-use jointrig_firmware::board::{Coil, Inputs, NoDrive, NoStage};
+use jointrig_firmware::board::{Inputs, NoDrive, NoStage};
 use jointrig_firmware::ring::Slot;
 use jointrig_firmware::{Core, Facts};
 use jointrig_native::executor::{Poller, Polling, Woken};
@@ -23,11 +25,16 @@ use jointrig_protocol::channel::words_per_scan;
 use jointrig_protocol::limits::scans_per_block;
 
 use crate::header::{Header, HeaderError};
+use crate::orders::{OrderedCoil, Orders, Output, tell};
 use crate::queue::{Queue, QueuedScans, read_stream};
 
 /// Duration of the scans that can be sent again, s. A person who strikes waits for half of it
 /// after "in place".
 const RING_S: f64 = 1.0;
+
+/// Added to the pause between two pulses, ms: the state machine counts scans, which arrive in
+/// blocks, and the program counts the time between two orders.
+const PAUSE_MARGIN_MS: u32 = 200;
 
 /// Bounds of the scans that a host accepts for it.
 const RING_SCANS: (u64, u64) = (256, 1 << 20);
@@ -51,17 +58,21 @@ pub enum OpenError {
 pub struct Bridge {
     header: Header,
     queue: Arc<Queue>,
+    orders: Arc<Orders>,
     link: DeviceEnd,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Bridge {
-    /// Reads the header of `source`, waiting for at most `patience`, and starts the device.
+    /// Reads the header of `source`, waiting for at most `patience`, and starts the device, which
+    /// writes its orders for a hammer to `input`. That is the input of the program, and is dropped
+    /// with the device or by [`Self::end_input`].
     ///
     /// # Errors
     /// [`OpenError`]. The thread that reads the source then ends when the source does.
     pub fn open(
         source: impl Read + Send + 'static,
+        input: impl Write + Send + 'static,
         patience: Duration,
     ) -> Result<(Self, HostEnd), OpenError> {
         let (host, device) = pair();
@@ -85,11 +96,13 @@ impl Bridge {
             Err(RecvTimeoutError::Timeout) => return Err(OpenError::Silent(patience.as_secs())),
             Err(RecvTimeoutError::Disconnected) => return Err(HeaderError::Ended.into()),
         };
+        let orders = Orders::start(input, &queue, &device)?;
         let thread = std::thread::Builder::new().name("bridge".into()).spawn({
             let (header, queue, link) = (header.clone(), Arc::clone(&queue), device.clone());
-            move || run(&header, &queue, &link)
+            let orders = Arc::clone(&orders);
+            move || run(&header, &queue, &orders, &link)
         })?;
-        Ok((Self { header, queue, link: device, thread: Some(thread) }, host))
+        Ok((Self { header, queue, orders, link: device, thread: Some(thread) }, host))
     }
 
     /// The recorder and its channels.
@@ -108,6 +121,11 @@ impl Bridge {
         self.queue.take_remarks()
     }
 
+    /// Ends the input of the program: its hammer is disarmed, and it should end.
+    pub fn end_input(&self) {
+        self.orders.close();
+    }
+
     /// Scans of the longest block so far: a scan may have been sampled by so much before it
     /// arrives.
     pub fn longest_block(&self) -> u32 {
@@ -123,11 +141,12 @@ impl Drop for Bridge {
             // the device's own thread has already printed a panic
             let _ = thread.join();
         }
+        self.orders.close();
     }
 }
 
 /// The device's thread.
-fn run(header: &Header, queue: &Arc<Queue>, link: &DeviceEnd) {
+fn run(header: &Header, queue: &Arc<Queue>, orders: &Arc<Orders>, link: &DeviceEnd) {
     // leaked like the ring: a program opens few devices, and the firmware's tables are constant
     let channels: &'static [_] = Box::leak(header.channels.clone().into_boxed_slice());
     let per_block = scans_per_block(words_per_scan(channels)).unwrap_or(1) as u64;
@@ -141,24 +160,36 @@ fn run(header: &Header, queue: &Arc<Queue>, link: &DeviceEnd) {
         // the core counts scans; where it needs a time, the nearest integer is close enough
         scan_rate_hz: header.rate_hz.round() as u32,
         channels,
-        coil_cap_us: 0,
+        coil_cap_us: header.hammer.map_or(0, |hammer| hammer.longest_us),
         stage: false,
         drive_v: 0.0,
         sync: false,
         reset: Reset::Unknown,
         boot: seconds_since_1970(),
     };
-    let core: Rc<NativeCore> = Rc::new(Core::new(facts, Box::leak(slots)));
+    let core = Core::new(facts, Box::leak(slots));
+    let core: Rc<NativeCore> = Rc::new(match header.hammer {
+        Some(hammer) => core.with_coil_pause(hammer.pause_ms + PAUSE_MARGIN_MS),
+        None => core,
+    });
+    let output = header.hammer.map(|hammer| Rc::new(RefCell::new(Output::new(orders, hammer))));
     let parts = Parts {
         scans: QueuedScans::new(queue, link),
-        coil: NoCoil,
+        coil: OrderedCoil(output.clone()),
         drive: NoDrive,
-        inputs: NoGuard,
+        inputs: UnknownGuard { closed: output.is_some() },
         stage: NoStage,
     };
     let woken = Arc::new(Woken::default());
-    let mut poller = Poller::new(Polling::Join, parts.tasks(&core, link), &woken);
+    let mut tasks = parts.tasks(&core, link);
+    if let Some(output) = &output {
+        tasks.push(Box::pin(tell(Rc::clone(&core), Rc::clone(output))));
+    }
+    let mut poller = Poller::new(Polling::Join, tasks, &woken);
     run_by_the_clock(&mut poller, &woken, link);
+    if let Some(output) = output {
+        output.borrow_mut().disarm();
+    }
 }
 
 /// A number that no earlier start had.
@@ -171,25 +202,14 @@ fn text<const N: usize>(value: &str) -> Text<N> {
     value.chars().take(N).collect()
 }
 
-/// No coil.
-struct NoCoil;
-
-impl Coil for NoCoil {
-    fn cap_us(&self) -> u32 {
-        0
-    }
-
-    fn pulse(&mut self, _width_us: u32) {}
-
-    fn off(&mut self) {}
+/// No input knows the guard.
+struct UnknownGuard {
+    closed: bool,
 }
 
-/// No guard: it counts as open.
-struct NoGuard;
-
-impl Inputs for NoGuard {
+impl Inputs for UnknownGuard {
     fn interlock_closed(&mut self) -> bool {
-        false
+        self.closed
     }
 
     fn emergency_stop(&mut self) -> bool {

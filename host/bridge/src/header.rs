@@ -19,6 +19,7 @@
 //! | `sample` | `i16`, `i32`, `f32` or `f64` |
 //! | `bits` | for `i32`: bits of a full scale, e.g. 24 for codes of ±2²³; 32 if absent. For `f32` and `f64`: resolution of the recorder; 24 if absent |
 //! | `held` | the source can wait (a file, a simulation); a recorder cannot; `false` if absent |
+//! | `hammer` | an output of the program may fire a hammer ([`Hammer`]); absent if none may |
 //! | `name` | of the channel, up to 24 bytes |
 //! | `role` | what the channel is for ([`ROLES`]); `auxiliary` if absent |
 //! | `unit` | of what it measures ([`UNITS`]) |
@@ -33,7 +34,7 @@
 use std::io::{BufRead, Read};
 
 use jointrig_protocol::channel::{Axis, Channel, NARROW_BITS, Name, Quantity, Role, WIDE_BITS};
-use jointrig_protocol::limits::{CHANNEL_CAPACITY, NAME_BYTES};
+use jointrig_protocol::limits::{CHANNEL_CAPACITY, COIL_PULSE_CAP_US, NAME_BYTES};
 use serde::Deserialize;
 
 /// Version of the format.
@@ -54,6 +55,12 @@ const BITS: std::ops::RangeInclusive<u8> = 8..=32;
 
 /// Longest delay, s.
 const DELAY_S: f64 = 1.0;
+
+/// Longest pulse that a hammer's output can state, µs: below the shortest, no coil moves a bolt.
+const LONGEST_US: std::ops::RangeInclusive<u32> = 100..=COIL_PULSE_CAP_US;
+
+/// Shortest pause between two pulses that a hammer's output can state, s.
+const PAUSE_S: std::ops::RangeInclusive<f64> = 0.6..=60.0;
 
 /// Names of the channels' roles.
 pub const ROLES: [(&str, Role); 9] = [
@@ -111,6 +118,15 @@ impl Sample {
     }
 }
 
+/// An output of the program that may fire a hammer ([`crate::orders`]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hammer {
+    /// Longest pulse, µs, which the program's hardware times and bounds.
+    pub longest_us: u32,
+    /// Shortest pause from the end of one pulse to the next, ms.
+    pub pause_ms: u32,
+}
+
 /// A checked header.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
@@ -124,6 +140,8 @@ pub struct Header {
     pub sample: Sample,
     /// The source can wait.
     pub held: bool,
+    /// An output may fire a hammer.
+    pub hammer: Option<Hammer>,
     /// The channels in the order of a scan. A channel's range is its full scale; its bits are those
     /// of the codes that reach the host.
     pub channels: Vec<Channel>,
@@ -165,7 +183,15 @@ struct Line {
     bits: Option<u8>,
     #[serde(default)]
     held: bool,
+    hammer: Option<HammerLine>,
     channels: Vec<ChannelLine>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HammerLine {
+    longest_us: u32,
+    shortest_pause_s: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -252,12 +278,14 @@ impl Header {
             channels.push(channel);
             bits.push(own_bits);
         }
+        let hammer = line.hammer.map(|own| hammer(&own, &channels)).transpose()?;
         Ok(Self {
             board: name("board", &line.board)?,
             serial: name("serial", &line.serial)?,
             rate_hz: line.rate_hz,
             sample: line.sample,
             held: line.held,
+            hammer,
             channels,
             bits,
         })
@@ -274,6 +302,23 @@ impl Header {
 /// lose some in codes of 16, and no code has more than [`WIDE_BITS`].
 fn sent_bits(bits: u8) -> u8 {
     if bits <= 16 { bits } else { bits.clamp(NARROW_BITS + 1, WIDE_BITS) }
+}
+
+/// The output that fires a hammer, whose strikes these channels must show.
+fn hammer(own: &HammerLine, channels: &[Channel]) -> Result<Hammer, HeaderError> {
+    refuse(LONGEST_US.contains(&own.longest_us), || {
+        let (from, to) = (LONGEST_US.start(), LONGEST_US.end());
+        format!("hammer: longest_us is {}: {from} to {to} µs are possible", own.longest_us)
+    })?;
+    let pause_s = own.shortest_pause_s.unwrap_or(*PAUSE_S.start());
+    refuse(PAUSE_S.contains(&pause_s), || {
+        let (from, to) = (PAUSE_S.start(), PAUSE_S.end());
+        format!("hammer: shortest_pause_s is {pause_s}: {from} to {to} s are possible")
+    })?;
+    refuse(channels.iter().any(|channel| channel.role == Role::HammerForce), || {
+        "hammer: a channel with the role hammer_force is needed, or no strike would be seen".into()
+    })?;
+    Ok(Hammer { longest_us: own.longest_us, pause_ms: (pause_s * 1e3).ceil() as u32 })
 }
 
 /// A channel that is sent in codes of `bits`.
@@ -388,6 +433,34 @@ mod tests {
             let said = refused(from, to);
             assert!(said.contains(word), "{said}");
         }
+    }
+
+    #[test]
+    fn a_hammer_is_bounded_and_needs_its_force() {
+        let with = |fields: &str| {
+            let line = GOOD.replacen("\"sample\"", &format!("\"hammer\":{{{fields}}},\"sample\""), 1);
+            Header::parse(line.as_bytes()).map(|header| header.hammer).map_err(|error| error.to_string())
+        };
+        let hammer = |longest_us, pause_ms| Ok(Some(Hammer { longest_us, pause_ms }));
+        assert_eq!(Header::parse(GOOD.as_bytes()).expect("good").hammer, None);
+        assert_eq!(with(r#""longest_us":8000"#), hammer(8000, 600));
+        assert_eq!(with(r#""longest_us":100,"shortest_pause_s":2.5"#), hammer(100, 2500));
+        for (fields, word) in [
+            (r#""longest_us":8001"#, "longest_us is 8001: 100 to 8000 µs"),
+            (r#""longest_us":0"#, "longest_us is 0"),
+            (r#""longest_us":-1"#, "integer `-1`"),
+            (r#""shortest_pause_s":1"#, "missing field `longest_us`"),
+            (r#""longest_us":5000,"shortest_pause_s":0.1"#, "shortest_pause_s is 0.1: 0.6 to 60 s"),
+            (r#""longest_us":5000,"shortest_pause_s":61"#, "shortest_pause_s is 61"),
+            (r#""longest_us":5000,"pause":1"#, "unknown field `pause`"),
+        ] {
+            let said = with(fields).expect_err(fields);
+            assert!(said.contains(word), "{said}");
+        }
+        let without = GOOD.replacen("hammer_force", "auxiliary", 1);
+        let line = without.replacen("\"sample\"", "\"hammer\":{\"longest_us\":5000},\"sample\"", 1);
+        let said = Header::parse(line.as_bytes()).expect_err("no force").to_string();
+        assert!(said.contains("role hammer_force"), "{said}");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! A program that reads a recorder (NI, openDAQ, a sound card, …) writes a description and then
 //! blocks of samples to a stream of bytes: its standard output, or a socket. This crate reads them
 //! and runs the firmware's own core over them: the host then finds the hits, asks for scans again
-//! and counts losses as with the controller. There is no coil, no drive and no stage: a bridge
-//! fires nothing, and its longest coil pulse is 0 µs.
+//! and counts losses as with the controller. There is no drive and no stage, and a coil only if the
+//! program announces that one of its outputs may fire a hammer ([`orders`]).
 //!
 //! # The stream
 //!
@@ -41,4 +41,5 @@ pub mod blocks;
 pub mod board;
 pub mod convert;
 pub mod header;
+pub mod orders;
 pub mod queue;

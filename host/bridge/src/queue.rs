@@ -34,6 +34,10 @@ const BLOCKS_PER_TURN: u32 = 4;
 /// transmit task looks for a remainder every 0.1 s.
 const LAST_BLOCKS: Duration = Duration::from_millis(250);
 
+/// Longest block of a program with a hammer, s: 0.1 s without scans disarm it, and a PC delivers
+/// none exactly on time.
+const BLOCK_WITH_HAMMER_S: f64 = 0.05;
+
 /// Most remarks that wait to be read.
 const REMARKS_KEPT: usize = 256;
 
@@ -161,7 +165,7 @@ impl Queue {
         state.note_lost(lost);
     }
 
-    fn end(&self, why: String) {
+    pub(crate) fn end(&self, why: String) {
         let mut state = self.lock();
         let lost = std::mem::take(&mut state.overflowed);
         state.note_lost(lost);
@@ -169,7 +173,7 @@ impl Queue {
     }
 
     /// Wakes the device's task; the caller then nudges its thread.
-    fn wake(&self) {
+    pub(crate) fn wake(&self) {
         let waker = self.lock().waker.take();
         if let Some(waker) = waker {
             waker.wake();
@@ -192,6 +196,7 @@ pub fn read_stream(header: &Header, source: impl Read, queue: &Queue, link: &Dev
     let mut blocks = Blocks::new(source, header.scan_bytes());
     let mut converter = Converter::new(header);
     let mut arrivals = Arrivals::new(header.rate_hz);
+    let mut told_long = false;
     let why = loop {
         let block = match blocks.next_block() {
             Ok(Some(block)) => block,
@@ -225,6 +230,16 @@ pub fn read_stream(header: &Header, source: impl Read, queue: &Queue, link: &Dev
             Run::Invalid(scans) => queue.lose(scans),
         });
         queue.remark(remarks);
+        let block_s = scans as f64 / header.rate_hz;
+        if header.hammer.is_some()
+            && block_s > BLOCK_WITH_HAMMER_S
+            && !std::mem::replace(&mut told_long, true)
+        {
+            queue.remark([format!(
+                "the program writes blocks of {:.0} ms: with a hammer write 10 to 20 ms, because 100 ms without scans disarm it",
+                1e3 * block_s
+            )]);
+        }
         {
             let mut state = queue.lock();
             state.longest_block = state.longest_block.max(scans as u32);

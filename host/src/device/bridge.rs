@@ -1,15 +1,16 @@
 //! `bridge:COMMAND` and `bridge:tcp:HOST:PORT`: a recorder's blocks of samples from any program.
 //!
-//! The program is started here, without a shell, and ends with the session: its standard input is
-//! closed, and if it has not ended two seconds later it is killed. What it prints to standard error
-//! is logged; its last line is a part of the error when it ends.
+//! The program is started here, without a shell, and ends with the session: its standard input,
+//! which carries the orders for a hammer, is closed, and if it has not ended two seconds later it
+//! is killed. What it prints to standard error is logged; its last line is a part of the error when
+//! it ends.
 
 use super::error::DeviceError;
 use super::tcp;
 use super::transport::{Recorder, Transport};
 use jointrig_bridge::board::{Bridge, OpenError};
 use jointrig_native::link::HostEnd;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -38,6 +39,13 @@ pub struct BridgedRecorder {
     device: Bridge,
 }
 
+impl Drop for BridgedRecorder {
+    fn drop(&mut self) {
+        // before the source, which waits for the program to end
+        self.device.end_input();
+    }
+}
+
 /// Where the blocks come from.
 enum Source {
     Program(Program),
@@ -54,16 +62,34 @@ impl Drop for Source {
     }
 }
 
+/// The direction of a socket in which the orders go; dropping it ends this direction.
+struct Backwards(TcpStream);
+
+impl Write for Backwards {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl Drop for Backwards {
+    fn drop(&mut self) {
+        // it may be closed already
+        drop(self.0.shutdown(Shutdown::Write));
+    }
+}
+
 /// A running program.
 struct Program {
     child: Child,
-    /// Open while the samples are wanted.
-    stdin: Option<ChildStdin>,
     last_line: Arc<Mutex<String>>,
 }
 
 impl Program {
-    fn start(command: &str) -> Result<(Self, impl Read + Send + use<>), String> {
+    fn start(command: &str) -> Result<(Self, ChildStdin, impl Read + Send + use<>), String> {
         let mut command = command_of(command)?;
         // Ctrl-C is for the host, which ends after the current hit and then ends the program
         #[cfg(unix)]
@@ -76,8 +102,10 @@ impl Program {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(|error| format!("the program could not be started: {error}; check its name and path"))?;
-        let (Some(stdout), Some(stderr)) = (child.stdout.take(), child.stderr.take()) else {
-            return Err("the program has no output".into());
+        let (Some(stdin), Some(stdout), Some(stderr)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            return Err("the program has no input or output".into());
         };
         let last_line = Arc::new(Mutex::new(String::new()));
         // it ends with the program
@@ -88,8 +116,7 @@ impl Program {
                 move || listen(BufReader::new(stderr), &last_line)
             })
             .map_err(|error| error.to_string())?;
-        let stdin = child.stdin.take();
-        Ok((Self { child, stdin, last_line }, stdout))
+        Ok((Self { child, last_line }, stdin, stdout))
     }
 
     /// Its exit status, if it ends within `patience`.
@@ -104,9 +131,8 @@ impl Program {
         }
     }
 
-    /// Closes its standard input, and kills it if that does not end it.
+    /// Kills it if it does not end, although its standard input was closed.
     fn end(&mut self) {
-        drop(self.stdin.take());
         if self.status(END_PATIENCE).is_none() {
             // it may have ended meanwhile
             drop(self.child.kill());
@@ -172,8 +198,8 @@ impl BridgedRecorder {
     /// [`DeviceError::Open`] with the cause, and how the program ended.
     pub fn start(command: &str) -> Result<Self, DeviceError> {
         let open = |why: String| DeviceError::Open { address: format!("bridge:{command}"), why };
-        let (program, output) = Program::start(command).map_err(open)?;
-        Self::of(Source::Program(program), Bridge::open(output, HEADER_PATIENCE)).map_err(open)
+        let (program, input, output) = Program::start(command).map_err(open)?;
+        Self::of(Source::Program(program), Bridge::open(output, input, HEADER_PATIENCE)).map_err(open)
     }
 
     /// Connects to a program at `host:port`, and reads the header that it sends.
@@ -183,11 +209,12 @@ impl BridgedRecorder {
     pub fn connect(place: &str) -> Result<Self, DeviceError> {
         let open = |why: String| DeviceError::Open { address: format!("bridge:tcp:{place}"), why };
         let connected = tcp::connect(place).and_then(|stream| {
-            stream.try_clone().map(|own| (own, stream)).map_err(|error| error.to_string())
+            let clones = stream.try_clone().and_then(|own| Ok((own, Backwards(stream.try_clone()?))));
+            clones.map(|(own, input)| (own, input, stream)).map_err(|error| error.to_string())
         });
-        let (stream, output) =
+        let (stream, input, output) =
             connected.map_err(|why| open(format!("{why}: does the recorder's program listen there?")))?;
-        Self::of(Source::Socket(stream), Bridge::open(output, HEADER_PATIENCE)).map_err(open)
+        Self::of(Source::Socket(stream), Bridge::open(output, input, HEADER_PATIENCE)).map_err(open)
     }
 
     /// The recorder behind a source whose header was read, or why it cannot be used.

@@ -171,6 +171,26 @@ pub(super) fn fitted(
     with_sensors(plan, channels).or_else(unfit)
 }
 
+/// Longest time from an order to a bridge until the force arrives here, s: a block of 50 ms before
+/// the order, one after it, the program's own time, and the bolt's flight.
+const BRIDGED_FLIGHT_S: f64 = 0.2;
+
+/// Refuses a plan that would count a late strike of a bridge's hammer as a missed one, and would
+/// then strike harder.
+pub(super) fn strikes_in_time(address: &str, plan: &Plan) -> Result<(), RunError> {
+    let flight_s = plan.trigger.get_ref().flight_s;
+    if plan.by_hand().is_none() && flight_s < BRIDGED_FLIGHT_S {
+        return Err(RunError::Unfit {
+            address: address.into(),
+            what: format!(
+                "through a bridge a strike is seen up to {BRIDGED_FLIGHT_S} s after its order, and the plan waits for {flight_s} s: set \
+                 trigger.flight_s to {BRIDGED_FLIGHT_S} or more"
+            ),
+        });
+    }
+    Ok(())
+}
+
 /// Checks that every response point is measured: by a fixed sensor, or by the vibrometer.
 fn measured_at_every_point(plan: &Plan, channels: &ChannelMap) -> Result<(), String> {
     let points = plan.geometry.response.iter().map(toml::Spanned::get_ref);

@@ -17,8 +17,7 @@ use super::answers::{Edits, Recount};
 use super::clock::ScanClock;
 use super::error::RunError;
 use super::keeper::{Announced, Keeper};
-use super::pulse::fitted;
-use super::pulse::{FIRST_SLOPE, PulseHit, PulseLoop};
+use super::pulse::{FIRST_SLOPE, PulseHit, PulseLoop, fitted, strikes_in_time};
 use super::shot::Shooter;
 use super::stage::Stage;
 use super::stage::same_or_accepted;
@@ -99,6 +98,9 @@ pub fn run(
     let info = session.info()?;
     let device = session.channels(&info)?;
     let (planned, remarks) = fitted(session.address(), &plan, &device, info.coil_cap_us)?;
+    if session.recorder().is_some() {
+        strikes_in_time(session.address(), &plan)?;
+    }
     let channels = store.calibrated(store.next_session()?, planned.clone())?;
     let changed = same_or_accepted(
         &store,
