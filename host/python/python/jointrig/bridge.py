@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import queue
 import socket
 import struct
 import sys
@@ -35,6 +36,7 @@ from numpy.typing import ArrayLike
 
 __all__ = [
     "Channel",
+    "Hammer",
     "Source",
     "from_callable",
     "from_ldaq",
@@ -90,6 +92,113 @@ class Channel:
     bits: int | None = None
 
 
+@dataclass(frozen=True)
+class Hammer:
+    """A digital output that may fire a hammer, read docs/safety.md first.
+
+    fire(pulse_us) starts one pulse of so many µs, which the device's own hardware times and ends (a counter output), and returns.
+    Never switch an output on and later off instead: a PC may stop in between. release() switches the output off; it is called
+    whenever the hammer is disarmed. Both run in a thread of their own. longest_us: 100 to 8000. shortest_pause_s: from the end of
+    one pulse to the next, 0.6 to 60 s. Write blocks of 10 to 20 ms: without samples for 0.1 s jointrig disarms the hammer.
+    """
+
+    fire: Callable[[int], object]
+    longest_us: int
+    shortest_pause_s: float = 0.6
+    release: Callable[[], object] | None = None
+
+
+# without a line from jointrig for so long, s, the hammer is disarmed
+_SILENCE_S = 1.0
+
+
+class _Guard:
+    """Passes jointrig's orders on to a hammer, as far as they are allowed: one pulse for each arming, no longer and no sooner
+    than the hammer allows, none without a line for 1 s, and none that is late."""
+
+    def __init__(self, hammer: Hammer) -> None:
+        self._hammer = hammer
+        self._bytes: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._armed, self._spent = False, False
+        self._heard_s, self._free_s, self._sequence = 0.0, float("-inf"), 0
+        self.error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def hear(self, data: bytes) -> None:
+        """Takes bytes from jointrig; none at their end."""
+        self._bytes.put(data)
+
+    def end(self) -> None:
+        """Disarms. The thread may be in fire() for ever if a driver hangs."""
+        self.hear(b"")
+        self._thread.join(2.0)
+
+    def _run(self) -> None:
+        rest, ended = b"", False
+        try:
+            while not ended:
+                try:
+                    left_s = max(0.0, self._heard_s + _SILENCE_S - time.monotonic())
+                    parts = [self._bytes.get(timeout=left_s if self._armed else None)]
+                except queue.Empty:
+                    self._disarm("jointrig is silent")
+                    continue
+                # everything that has come, because an order that others follow is late
+                while not self._bytes.empty():
+                    parts.append(self._bytes.get())
+                now_s = time.monotonic()
+                stale = self._armed and now_s - self._heard_s > _SILENCE_S
+                if stale:
+                    self._disarm("this program stood still")
+                self._heard_s = now_s
+                ended = b"" in parts
+                *lines, rest = (rest + b"".join(parts)).split(b"\n")
+                for place, line in enumerate(lines):
+                    self._obey(json.loads(line), late=stale or ended or bool(rest) or place + 1 < len(lines))
+        except BaseException as error:  # the output is released in any case, and the program ends with this error
+            self.error = error
+        finally:
+            self._armed = False
+            if self._hammer.release is not None:
+                self._hammer.release()
+
+    def _obey(self, order: dict[str, Any], late: bool) -> None:
+        if order.get("armed") is True:
+            self._armed, self._spent = True, False
+        elif order.get("armed") is False:
+            self._disarm()
+        elif "fire_us" in order:
+            self._fire(order["fire_us"], order["sequence"], late)
+
+    def _fire(self, pulse_us: int, sequence: int, late: bool) -> None:
+        now_s, longest_us = time.monotonic(), self._hammer.longest_us
+        if not self._armed or self._spent:
+            why = "it is not armed"
+        elif late:
+            why = "the order comes late"
+        elif type(pulse_us) is not int or not 0 < pulse_us <= longest_us:
+            why = f"a pulse of 1 to {longest_us} µs is possible"
+        elif now_s < self._free_s:
+            why = f"{self._hammer.shortest_pause_s} s between two pulses are needed"
+        elif sequence <= self._sequence:
+            why = "the order is repeated"
+        else:
+            self._sequence, self._spent = sequence, True
+            self._free_s = now_s + 1e-6 * pulse_us + self._hammer.shortest_pause_s
+            self._hammer.fire(pulse_us)
+            return
+        print(f"the hammer is not fired with {pulse_us} µs: {why}", file=sys.stderr, flush=True)
+
+    def _disarm(self, why: str | None = None) -> None:
+        if self._armed:
+            self._armed = False
+            if why is not None:
+                print(f"the hammer is disarmed: {why}", file=sys.stderr, flush=True)
+            if self._hammer.release is not None:
+                self._hammer.release()
+
+
 class Source:
     """Writes a recorder's samples to jointrig.
 
@@ -97,7 +206,7 @@ class Source:
     sample: type of the samples, i16, i32, f32 or f64. bits: of a full scale of i32, e.g. 24 for codes of ±2²³ (32 if absent);
     of f32 and f64, the resolution that is kept, 8 to 30 (24 if absent). held: the source can wait, as a file or a simulation;
     a recorder cannot. listen: "HOST:PORT", to wait there for a jointrig on another computer
-    (`--device bridge:tcp:HOST:PORT`) instead of being started by it.
+    (`--device bridge:tcp:HOST:PORT`) instead of being started by it. hammer: an output that may fire one.
     """
 
     def __init__(
@@ -111,6 +220,7 @@ class Source:
         bits: int | None = None,
         held: bool = False,
         listen: str | None = None,
+        hammer: Hammer | None = None,
     ) -> None:
         self._type = _TYPES[sample]
         self._channels = len(channels)
@@ -118,12 +228,15 @@ class Source:
         self._gone = threading.Event()
         header: dict[str, Any] = {"jointrig_bridge": 1, "board": board, "serial": serial, "rate_hz": rate_hz}
         header |= {"sample": sample, "held": held} | ({} if bits is None else {"bits": bits})
+        if hammer is not None:
+            header["hammer"] = {"longest_us": hammer.longest_us, "shortest_pause_s": hammer.shortest_pause_s}
         header["channels"] = [{k: v for k, v in asdict(own).items() if v is not None} for own in channels]
         self._socket = _accept(listen) if listen else None
         self._file = -1 if self._socket else _claim_stdout()
-        if self._socket is None and os.environ.get(_UNDER_THE_HOST):
-            # the host keeps standard input open as long as it wants samples
-            threading.Thread(target=self._watch_stdin, daemon=True).start()
+        self._guard = None if hammer is None else _Guard(hammer)
+        # the host keeps standard input open as long as it wants samples
+        if os.environ.get(_UNDER_THE_HOST) if self._socket is None else hammer is not None:
+            threading.Thread(target=self._hear, daemon=True).start()
         self._send(json.dumps(header, allow_nan=False).encode() + b"\n")
 
     def __enter__(self) -> Source:
@@ -133,13 +246,16 @@ class Source:
         self.close()
 
     def close(self) -> None:
-        """Writes nothing more."""
+        """Writes nothing more, and disarms the hammer."""
         self._gone.set()
+        if self._guard is not None:
+            self._guard.end()
         if self._socket is not None:
             self._socket.close()
 
     def wanted(self) -> bool:
         """Whether jointrig still reads: False once it has ended or the connection is closed."""
+        self._check()
         return not self._gone.is_set()
 
     def write(self, samples: ArrayLike) -> None:
@@ -172,7 +288,12 @@ class Source:
         self._lost, self._flags = 0, 0
         self._send(head + data)
 
+    def _check(self) -> None:
+        if self._guard is not None and self._guard.error is not None:
+            raise RuntimeError("the hammer's output failed: switch its supply off before you go near it") from self._guard.error
+
     def _send(self, data: bytes) -> None:
+        self._check()
         if self._gone.is_set():
             return
         try:
@@ -187,10 +308,21 @@ class Source:
                 raise
             self._gone.set()
 
-    def _watch_stdin(self) -> None:
-        while os.read(0, 4096):
-            pass
+    def _hear(self) -> None:
+        data = b"begun"
+        while data:
+            try:
+                data = os.read(0, 4096) if self._socket is None else self._socket.recv(4096)
+            except OSError:  # the connection is closed
+                data = b""
+            if self._guard is not None:
+                self._guard.hear(data)
         self._gone.set()
+
+
+def _scans(rate_hz: float, source: dict[str, Any]) -> int:
+    """Of a block: 50 ms, or 20 ms with a hammer."""
+    return max(1, int(rate_hz / (20 if source.get("hammer") is None else 50)))
 
 
 def _accept(listen: str) -> socket.socket:
@@ -252,7 +384,7 @@ def from_opendaq(
             break
     with Source(board, serial=serial, rate_hz=rate_hz, channels=channels, sample="f64", **source) as out:
         out.write(block.reshape(len(signals), -1).T)
-        most = max(1, int(rate_hz / 20))
+        most = _scans(rate_hz, source)
         while out.wanted():
             block, status = reader.read(most, 200, return_status=True)
             if not status.valid:
@@ -283,7 +415,7 @@ def from_sounddevice(channels: Sequence[Channel], *, device: Any = None, rate_hz
         ) as stream,
     ):
         while out.wanted():
-            samples, overflowed = stream.read(int(rate_hz / 20))
+            samples, overflowed = stream.read(_scans(rate_hz, source))
             if overflowed:
                 out.overrun()
             out.write(samples * scale.astype(np.float32))
@@ -295,7 +427,7 @@ def from_nidaqmx(task: Any, channels: Sequence[Channel], *, board: str, serial: 
     Channels of voltage give V: state sensitivity_v. Channels with a unit (IEPE accelerometer, force) give that unit.
     """
     rate_hz = float(task.timing.samp_clk_rate)
-    most = int(rate_hz / 20)
+    most = _scans(rate_hz, source)
     # ten seconds: the driver reports an overrun as an error and stops
     task.in_stream.input_buf_size = int(10 * rate_hz)
     task.start()
