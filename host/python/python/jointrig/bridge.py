@@ -437,6 +437,10 @@ def from_nidaqmx(task: Any, channels: Sequence[Channel], *, board: str, serial: 
     task.stop()
 
 
+# Duration of the beginning of a recording that is written no faster than it was recorded, s.
+_OPENING_S = 5.0
+
+
 def from_wav(path: str | os.PathLike[str], channels: Sequence[Channel], *, serial: str | None = None, **source: Any) -> None:
     """Writes a recording from a WAV file of 16, 24 or 32 bits, from its beginning to its end, as fast as jointrig measures.
 
@@ -454,8 +458,14 @@ def from_wav(path: str | os.PathLike[str], channels: Sequence[Channel], *, seria
         sample = "i16" if bits == 16 else "i32"
         source = {"sample": sample, "bits": bits, "held": True} | source
         with Source("WAV file", serial=serial or name, rate_hz=rate_hz, channels=channels, **source) as out:
+            done = 0
             while out.wanted() and (frames := file.readframes(max(1, rate_hz // 20))):
-                out.write(_codes(frames, bits).reshape(-1, count))
+                codes = _codes(frames, bits).reshape(-1, count)
+                out.write(codes)
+                done += len(codes)
+                # until jointrig holds the source, nothing else keeps it from being read to its end
+                if done < _OPENING_S * rate_hz:
+                    time.sleep(len(codes) / rate_hz)
 
 
 def _codes(frames: bytes, bits: int) -> np.ndarray:
