@@ -4,7 +4,8 @@
 //!   error. Numbers are formatted for the command line.
 //! - The progress of a long task is a bar on a terminal, otherwise a line every ten seconds, so
 //!   that a log shows that work continues.
-//! - The first Ctrl-C ends the work after the current shot, the second one ends the program.
+//! - The first Ctrl-C ends the work after the current shot (or file), the second one ends the
+//!   program.
 
 use super::error::CliError;
 use crate::campaign::run::progress::Pace;
@@ -97,19 +98,20 @@ impl Drop for Waiting {
 /// Returns a flag that Ctrl-C (or a termination signal) sets.
 pub fn flag() -> Arc<AtomicBool> {
     let stop = Arc::default();
-    catch(&stop);
+    catch(&stop, "shot");
     stop
 }
 
-/// Makes Ctrl-C (or a termination signal) set this flag.
-pub fn catch(stop: &Arc<AtomicBool>) {
+/// Makes Ctrl-C (or a termination signal) set this flag; the message says that the current `part`
+/// of the work is still finished.
+pub fn catch(stop: &Arc<AtomicBool>, part: &'static str) {
     let raised = stop.clone();
     let set = ctrlc::set_handler(move || {
         if raised.swap(true, Ordering::Relaxed) {
             // everything accepted is already in the file
             std::process::exit(1);
         }
-        tell_line!("\nstopping after the current shot; press Ctrl-C again to end immediately");
+        tell_line!("\nstopping after the current {part}; press Ctrl-C again to end immediately");
     });
     if let Err(error) = set {
         log::warn!("Ctrl-C cannot be caught ({error}): it will end the program immediately");

@@ -111,7 +111,7 @@ impl Shaker {
         if info.drive_v > 0.0 && !info.stage {
             prompt(self.yes, levels.len())?;
         }
-        output::catch(&stop);
+        output::catch(&stop, "shot");
         tell_line!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
         let options = LevelOptions {
             levels,

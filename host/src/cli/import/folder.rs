@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::names::{Named, NamedFile, Pattern, from_folder, from_table};
+use super::names::{Named, NamedFile, Pattern, Table, from_folder};
 use super::records::{Brought, bring, bring_channels, has_all_channels, length_notice, origin_of};
 use super::{Frfs, bad, frfs};
 use crate::campaign::import::CellName;
@@ -31,7 +31,7 @@ pub(super) struct Wishes<'w> {
 
 /// Summaries of what was used of each file, printed once for all files with the same summary.
 #[derive(Default)]
-struct Taken(Vec<(String, String, usize)>);
+pub(super) struct Taken(Vec<(String, String, usize)>);
 
 impl Taken {
     fn add(&mut self, file: &Path, taken: &str) {
@@ -42,7 +42,17 @@ impl Taken {
     }
 
     fn tell(&self) {
-        for (taken, first, count) in &self.0 {
+        self.tell_from(0);
+    }
+
+    /// Number of different summaries.
+    pub(super) fn different(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Prints those after the first `known`.
+    pub(super) fn tell_from(&self, known: usize) {
+        for (taken, first, count) in self.0.iter().skip(known) {
             match count - 1 {
                 0 => tell_line!("{first}: {taken}"),
                 more => tell_line!("{first} and {more} more: {taken}"),
@@ -50,6 +60,10 @@ impl Taken {
         }
     }
 }
+
+/// Why a file of a folder is left out.
+pub(super) const LEFT_OUT: &str =
+    "left out, it is no .npz and no universal file, nor .csv or .wav with the name of a cell";
 
 /// Imports all files of `folder`.
 ///
@@ -60,14 +74,11 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
     let mut store = Store::open(into)?;
     let plan = store.plan()?;
     let (sources, left_out) = match wishes.names {
-        Some(table) => (from_table(folder, table)?, Vec::new()),
+        Some(table) => (Table::read(table)?.files(folder)?, Vec::new()),
         None => from_folder(folder, &plan, wishes.configuration, wishes.pattern)?,
     };
     for path in &left_out {
-        tell_line!(
-            "{}: left out, it is no .npz and no universal file, nor .csv or .wav with the name of a cell",
-            path.display()
-        );
+        tell_line!("{}: {LEFT_OUT}", path.display());
     }
     let waiting = Waiting::of("importing files");
     let (mut all, mut matrices, mut taken) = (Brought::default(), 0, Taken::default());
@@ -80,7 +91,7 @@ pub(super) fn import(folder: &Path, into: &Path, wishes: &Wishes<'_>) -> Result<
             )),
             other => other,
         };
-        match one(&mut store, &plan, source, wishes, &mut taken).map_err(told)? {
+        match one(&mut store, &plan, source, wishes, &mut taken, &mut say_refused).map_err(told)? {
             Some(brought) => all.add(&brought),
             None => matrices += 1,
         }
@@ -122,13 +133,15 @@ fn say_refused(of: &str, hit: u32, verdict: &Judgement) {
     }
 }
 
-/// Imports one file; returns counts for records, `None` for FRFs.
-fn one(
+/// Imports one file; returns counts for records, `None` for FRFs. `tell` receives the file's name
+/// (and cell), and each hit's number and verdict.
+pub(super) fn one(
     store: &mut Store,
     plan: &Plan,
     source: &NamedFile,
     wishes: &Wishes<'_>,
     taken: &mut Taken,
+    tell: &mut dyn FnMut(&str, u32, &Judgement),
 ) -> Result<Option<Brought>, CliError> {
     let NamedFile { path, name, holds } = source;
     let Wishes { replace, units, .. } = *wishes;
@@ -143,7 +156,7 @@ fn one(
         Named::Cell { configuration, impact, response } => {
             let origin = origin_of(path, name)?;
             let cell = CellName { configuration, impact, response };
-            let mut tell = |hit: u32, verdict: &Judgement| say_refused(name, hit, verdict);
+            let mut tell = |hit: u32, verdict: &Judgement| tell(name, hit, verdict);
             let brought = if has_all_channels(path, plan, wishes.calibrate)? {
                 bring_channels(store, &origin, &cell, path, (wishes.calibrate, replace), &mut tell)?
             } else {
@@ -173,7 +186,7 @@ fn one(
                 say(path, &read.notes);
                 let of_cell = format!("{name}: {impact} to {response}");
                 let brought = bring(store, &origin, &cell, read, replace, &mut |hit, verdict| {
-                    say_refused(&of_cell, hit, verdict);
+                    tell(&of_cell, hit, verdict);
                 })?;
                 taken.add(path, &brought.taken);
                 all.add(&brought);

@@ -3,10 +3,12 @@
 mod cut;
 mod exported;
 mod folder;
+mod follow;
 mod names;
 mod records;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
 use nalgebra::{DMatrix, Scalar};
@@ -56,6 +58,11 @@ use names::Pattern;
 /// content. The import adds to existing data; what is already present is not stored again, so the
 /// command may be repeated.
 ///
+/// With --follow, each file is imported as soon as it is complete in the folder, until the campaign
+/// is complete or Ctrl-C is pressed: for systems that write a file for each hit or each place. Its
+/// verdicts are printed, `jointrig serve FILE.jrig` shows them, and the same command continues after
+/// an interruption.
+///
 /// A continuous recording (npz, wav, csv or universal file with all channels; --calibrate as above) is
 /// cut with --cut: its hits are found, judged and
 /// fitted to the plan's order (--order plan) by the structure's response, or to a table (--table).
@@ -101,6 +108,14 @@ pub struct Import {
     /// and logs the replacement.
     #[arg(long, requires = "into")]
     replace: bool,
+    /// Folder: import each file that appears in it, until the campaign is complete or Ctrl-C is
+    /// pressed.
+    #[arg(long, requires = "into", conflicts_with_all = ["cut", "impact", "response"])]
+    follow: bool,
+    /// Following a folder: a file is complete when its size and its time have not changed for so
+    /// long. Use 3 for a FAT disk or a network share, whose times are coarse.
+    #[arg(long, value_name = "SECONDS", requires = "follow", value_parser = output::positive, default_value = "1")]
+    settle: f64,
     /// Cut a continuous recording into hits.
     #[arg(long, requires = "into")]
     cut: bool,
@@ -158,16 +173,18 @@ impl Import {
                 calibrate: &self.calibrate,
                 levels: self.levels,
             }),
+            (None, Some(into), configuration, None, None) if self.follow => {
+                let settle = Duration::try_from_secs_f64(self.settle)
+                    .map_err(|_| CliError::Usage("--settle: too many seconds".into()))?;
+                follow::follow(&self.file, into, &self.wishes(configuration.as_deref()), settle)
+            }
             (None, Some(into), None, None, None)
                 if self.names.is_none() && self.pattern.is_none() && is_archive(&self.file) =>
             {
                 exported::import(&self.file, into)
             }
             (None, Some(into), configuration, None, None) if self.file.is_dir() => {
-                let (configuration, names) = (configuration.as_deref(), self.names.as_deref());
-                let (pattern, calibrate) = (self.pattern.as_ref(), &self.calibrate);
-                let wishes = Wishes { configuration, names, pattern, calibrate, replace, units };
-                folder::import(&self.file, into, &wishes)
+                folder::import(&self.file, into, &self.wishes(configuration.as_deref()))
             }
             (Some(out), ..) => self.convert(out),
             (None, Some(into), Some(configuration), Some(impact), Some(response)) => {
@@ -186,6 +203,18 @@ impl Import {
                  and --response); a folder needs only --into"
                     .into(),
             )),
+        }
+    }
+
+    /// What is stated about the files of a folder.
+    fn wishes<'w>(&'w self, configuration: Option<&'w str>) -> Wishes<'w> {
+        Wishes {
+            configuration,
+            names: self.names.as_deref(),
+            pattern: self.pattern.as_ref(),
+            calibrate: &self.calibrate,
+            replace: self.replace,
+            units: &self.units,
         }
     }
 

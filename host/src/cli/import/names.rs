@@ -102,48 +102,139 @@ impl Pattern {
     }
 }
 
-/// Every file named in the table.
-pub(super) fn from_table(folder: &Path, table: &Path) -> Result<Vec<NamedFile>, CliError> {
-    let told = |error: csv::Error| {
-        bad(format!(
-            "{}: {error}; a table of names has the columns file, configuration, impact, response, the last two empty for FRFs and \
-             for universal files whose labels name impact and response",
-            table.display()
-        ))
-    };
-    let text = untrusted_input::text(table, untrusted_input::TABLE).map_err(|source| CliError::Read {
-        path: table.into(),
-        doing: "reading the table of names",
-        source,
-    })?;
-    let mut rows = csv::ReaderBuilder::new()
-        .delimiter(delimiter(&text))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let mut sources = Vec::new();
-    for row in rows.deserialize::<NameRow>() {
-        let NameRow { file, configuration, impact, response } = row.map_err(told)?;
-        let path = folder.join(&file);
-        if !path.is_file() {
-            return Err(bad(format!("{}: there is no file {}", table.display(), path.display())));
-        }
-        let holds = match (impact.is_empty(), response.is_empty()) {
-            (false, false) => Named::Cell { configuration, impact, response },
-            (true, true) => with_labels_or_frfs(&path, configuration)?,
-            _ => {
-                return Err(bad(format!(
-                    "{}: {file} has only one of impact and response: give both or none",
-                    table.display()
-                )));
-            }
-        };
-        sources.push(NamedFile { path, name: file, holds });
-    }
-    Ok(sources)
+/// The table of names.
+pub(super) struct Table {
+    path: PathBuf,
+    rows: Vec<NameRow>,
 }
 
-/// Every readable file of the folder and its subfolders; `configuration` applies if neither the
-/// file's nor its folder's name gives one.
+impl Table {
+    /// Reads it.
+    ///
+    /// # Errors
+    /// It cannot be read, or a row has only one of impact and response.
+    pub(super) fn read(table: &Path) -> Result<Self, CliError> {
+        let told = |error: csv::Error| {
+            bad(format!(
+                "{}: {error}; a table of names has the columns file, configuration, impact, response, the last two empty for FRFs and \
+                 for universal files whose labels name impact and response",
+                table.display()
+            ))
+        };
+        let text = untrusted_input::text(table, untrusted_input::TABLE).map_err(|source| CliError::Read {
+            path: table.into(),
+            doing: "reading the table of names",
+            source,
+        })?;
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter(&text))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let rows: Vec<NameRow> = reader.deserialize().collect::<Result<_, _>>().map_err(told)?;
+        match rows.iter().find(|row| row.impact.is_empty() != row.response.is_empty()) {
+            Some(NameRow { file, .. }) => Err(bad(format!(
+                "{}: {file} has only one of impact and response: give both or none",
+                table.display()
+            ))),
+            None => Ok(Self { path: table.into(), rows }),
+        }
+    }
+
+    /// Every file that it names.
+    ///
+    /// # Errors
+    /// A file does not exist, or its content cannot be recognised.
+    pub(super) fn files(self, folder: &Path) -> Result<Vec<NamedFile>, CliError> {
+        let named = |row: NameRow| {
+            let path = folder.join(&row.file);
+            if !path.is_file() {
+                return Err(bad(format!("{}: there is no file {}", self.path.display(), path.display())));
+            }
+            row.names(path)
+        };
+        self.rows.into_iter().map(named).collect()
+    }
+
+    /// This file of the folder, if it is in the table.
+    ///
+    /// # Errors
+    /// Its content cannot be recognised.
+    pub(super) fn file(self, folder: &Path, path: &Path) -> Result<Option<NamedFile>, CliError> {
+        let row = self.rows.into_iter().find(|row| folder.join(&row.file) == path);
+        row.map(|row| row.names(path.into())).transpose()
+    }
+}
+
+impl NameRow {
+    /// The file that it names.
+    fn names(self, path: PathBuf) -> Result<NamedFile, CliError> {
+        let Self { file, configuration, impact, response } = self;
+        let holds = if impact.is_empty() {
+            with_labels_or_frfs(&path, configuration)?
+        } else {
+            Named::Cell { configuration, impact, response }
+        };
+        Ok(NamedFile { path, name: file, holds })
+    }
+}
+
+/// What the name and the content of a file of a folder say about it.
+pub(super) enum Identified {
+    /// What it holds.
+    Named(NamedFile),
+    /// It has no readable format, or could be anything (csv, wav) and has no cell's name.
+    LeftOut,
+    /// It has a readable format, and neither a cell's name nor labels.
+    Unnamed,
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// Whether a file has the ending of a format that is read.
+pub(super) fn is_readable(path: &Path) -> bool {
+    let ending = ending(path);
+    ENDINGS.iter().chain(&WITH_A_NAME).any(|known| *known == ending)
+}
+
+/// Identifies a file of a folder; `configuration` applies if neither the file's nor its folder's
+/// name gives one.
+///
+/// # Errors
+/// Its content cannot be read.
+pub(super) fn identified(
+    path: PathBuf,
+    folder: &Path,
+    plan: &Plan,
+    configuration: Option<&str>,
+    pattern: Option<&Pattern>,
+) -> Result<Identified, CliError> {
+    if !is_readable(&path) {
+        return Ok(Identified::LeftOut);
+    }
+    let by_name = WITH_A_NAME.contains(&&*ending(&path));
+    let holds = match (by_cell(&path, plan, configuration, pattern), pattern) {
+        (None, None) if !by_name => by_content(&path, folder, plan, configuration)?,
+        (holds, _) => holds,
+    };
+    Ok(match holds {
+        Some(holds) => {
+            let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+            Identified::Named(NamedFile { path, name, holds })
+        }
+        None if by_name && pattern.is_none() => Identified::LeftOut,
+        None => Identified::Unnamed,
+    })
+}
+
+/// How files are named so that their content is known.
+pub(super) const HOW_TO_NAME: &str = "say the form of their names with --pattern '{configuration}_{impact}_{response}_{hit}', or call them \
+                                      CONFIGURATION_IMPACT_RESPONSE (one cell each), CONFIGURATION (FRFs), put universal files whose labels \
+                                      name impact and response into a folder named after the configuration, say --configuration, or give \
+                                      --names TABLE.csv with the columns file, configuration, impact, response";
+
+/// Every readable file of the folder and its subfolders.
 ///
 /// # Errors
 /// A folder cannot be read, or files could not be identified: all of them are listed.
@@ -155,28 +246,17 @@ pub(super) fn from_folder(
 ) -> Result<(Vec<NamedFile>, Vec<PathBuf>), CliError> {
     let (mut sources, mut left_out, mut unnamed) = (Vec::new(), Vec::new(), Vec::new());
     for path in files(folder)? {
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let by_name = WITH_A_NAME.contains(&&*ending);
-        if !(by_name || ENDINGS.contains(&&*ending)) {
-            left_out.push(path);
-            continue;
-        }
-        let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
-        let holds = match (by_cell(&path, plan, configuration, pattern), pattern) {
-            (None, None) if !by_name => by_content(&path, folder, plan, configuration)?,
-            (holds, _) => holds,
-        };
-        match holds {
-            Some(holds) => sources.push(NamedFile { path, name, holds }),
-            None if by_name && pattern.is_none() => left_out.push(path),
-            None => unnamed.push(name),
+        match identified(path.clone(), folder, plan, configuration, pattern)? {
+            Identified::Named(source) => sources.push(source),
+            Identified::LeftOut => left_out.push(path),
+            Identified::Unnamed => {
+                unnamed.push(path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned());
+            }
         }
     }
     if !unnamed.is_empty() {
         return Err(bad(format!(
-            "{}: it is not clear what these files hold: {}. Say the form of their names with --pattern '{{configuration}}_{{impact}}_{{response}}_{{hit}}', or call them CONFIGURATION_IMPACT_RESPONSE (one cell each), CONFIGURATION (FRFs), \
-             put universal files whose labels name impact and response into a folder named after the configuration, say --configuration, or \
-             give --names TABLE.csv with the columns file, configuration, impact, response",
+            "{}: it is not clear what these files hold: {}: {HOW_TO_NAME}",
             folder.display(),
             unnamed.join(", ")
         )));
@@ -257,7 +337,7 @@ pub(in crate::cli) fn universal_files(folder: &Path) -> Result<Vec<PathBuf>, Cli
 }
 
 /// All files, sorted by name.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
     let failed = |source| CliError::Read { path: folder.into(), doing: "reading the folder", source };
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
