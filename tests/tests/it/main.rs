@@ -14,6 +14,7 @@ mod demo;
 mod export_everything;
 mod faults;
 mod import_folder;
+mod import_follow;
 mod killed;
 mod level_accuracy;
 mod live_load;

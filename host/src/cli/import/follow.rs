@@ -321,7 +321,9 @@ impl Following<'_> {
             Ok((_, Some(brought))) if brought.already == brought.hits => self.already += 1,
             Ok((name, brought)) => {
                 self.taken.tell_from(known);
-                verdicts.iter().for_each(|verdict| tell_line!("{verdict}"));
+                for verdict in &verdicts {
+                    tell_line!("{verdict}");
+                }
                 self.stored += 1;
                 let (kept, wanted) = progress::counts(&self.store)?;
                 if let Some(brought) = brought {

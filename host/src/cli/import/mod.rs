@@ -69,6 +69,7 @@ use names::Pattern;
 /// What was found is printed before it is stored; where a place is not certain, nothing is stored, and
 /// the message lists what to state.
 #[derive(Debug, Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub struct Import {
     /// An npz or universal file, or a folder of them.
     #[arg(value_name = "FILE|DIR")]
