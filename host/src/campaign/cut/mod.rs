@@ -9,14 +9,16 @@
 //! | what the user states about the places | [`stated`] |
 //! | what a marker channel says about them | [`marker`] |
 //! | steady parts of a shaker's recording | [`levels`] |
+//! | all of it, from a recording to the campaign file | [`import`] |
 //!
 //! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns
-//! the samples of one as a record of the plan's length, which `campaign::import` stores. The
+//! the samples of one as a record of the plan's length, which [`campaign::import`](super::import) stores. The
 //! recording is read in pieces: memory is needed for one record at a time, whatever the recording's
 //! length.
 
 pub mod alike;
 pub mod hits;
+pub mod import;
 pub mod levels;
 pub mod marker;
 pub mod places;
@@ -35,10 +37,11 @@ use self::hits::{ForceLevels, FoundHit, HitCriteria, HitFinder};
 use self::levels::{SteadyCriteria, SteadyFinder, SteadyPart};
 use self::places::{Fitted, HitEvidence, Named, PlaceOrder, Unclear};
 use self::recording::LongRecording;
-use crate::campaign::import;
+use crate::campaign::import::{ImportError, shot};
 use crate::campaign::plan::level::{Held, Level};
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::campaign::run::shaking::Meter;
+use crate::campaign::store::error::StoreError;
 use crate::campaign::verdict::judge::{ByRecord, Judge};
 use crate::campaign::verdict::others::Others;
 use crate::campaign::verdict::{Judgement, Verdict};
@@ -72,6 +75,23 @@ pub enum CutError {
     /// A file whose format is not known by its name cannot be read.
     #[error(transparent)]
     Unknown(#[from] FrfFileError),
+    /// What is stated does not fit the plan, or does not say at which places the hits are.
+    #[error("{0}")]
+    Stated(String),
+    /// It is not certain where hits were struck.
+    #[error("{name}: {what}")]
+    Asked {
+        /// The recording's name.
+        name: String,
+        /// What was found, which hits are not certain, and a table to be completed.
+        what: String,
+    },
+    /// The campaign file.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Its hits cannot be added to the campaign file.
+    #[error(transparent)]
+    Import(#[from] ImportError),
     /// Its content does not allow it.
     #[error("{name}: {what}")]
     Unfit {
@@ -315,7 +335,7 @@ fn judged(
         trigger_index,
         samples,
         gaps: Vec::new(),
-        shot: import::shot(0, trigger_index, found.peak_n, found.width_s),
+        shot: shot(0, trigger_index, found.peak_n, found.width_s),
     };
     // records are judged without regard to their cell
     let cell =
