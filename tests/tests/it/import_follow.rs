@@ -14,7 +14,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Longest wait for anything, on a busy machine.
-const LONGEST: Duration = Duration::from_secs(60);
+const LONGEST: Duration = Duration::from_mins(1);
 
 /// `import --follow` as it runs. Dropping it ends the process.
 struct Following {
@@ -51,7 +51,7 @@ impl Following {
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {
             if let Ok(line) = self.lines.recv_timeout(Duration::from_millis(200)) {
-                self.said += &format!("{line}\n");
+                self.said.extend([line.as_str(), "\n"]);
                 if line.contains(what) {
                     return line;
                 }
