@@ -5,16 +5,17 @@
 //! a = 1/(κGA) and the bending compliance b = 1/(EI), its section at y moves, relative to a rigid
 //! body that moves as the section at the contact, by
 //!
-//!     z(y) = F (a y − b y³/6),   θ_x(y) = −F b y²/2
+//! ```text
+//! z(y) = F (a y − b y³/6),   θ_x(y) = −F b y²/2
+//! ```
 //!
-//! up to the clamp, and as a rigid body beyond it (with a gradual transition). F is the force on B, so that the same formula
-//! holds for A (y > 0, loaded by −F) and for B (y < 0, loaded by F). The specimen's own inertia
-//! between contact and clamp is neglected here: its force is about a hundredth of F.
+//! up to the clamp, and as a rigid body beyond it (with a gradual transition). F is the force on B,
+//! so that the same formula holds for A (y > 0, loaded by −F) and for B (y < 0, loaded by F). The
+//! specimen's own inertia between contact and clamp is neglected: its force is about a hundredth of
+//! F.
 //!
 //! k_T is thus the stiffness between the two surfaces at y = 0: the bulk between the sensors and
 //! the contact is not part of it.
-
-use super::parameters::{Cause, Parameter};
 
 /// Number of parameters of one specimen: shear, the ratio of bending to it, distance of the clamp.
 pub const TERMS: usize = 3;
@@ -80,18 +81,6 @@ impl Specimen {
             bending_per_m2: BENDING_PER_M2,
             clamp_m: CLAMP * farthest_m,
         }
-    }
-
-    /// Its parameters.
-    pub(super) fn parameters(&self, side: &str) -> [Parameter; TERMS] {
-        let named = |what: &str, [start, sigma]: [f64; 2]| {
-            Parameter::new(format!("{what} of specimen {side}"), start, sigma, Cause::Bending)
-        };
-        [
-            named("the shear compliance", self.shear_per_n),
-            named("the ratio of bending to shear", self.bending_per_m2),
-            named("the distance between contact and clamp", [self.clamp_m, 0.0]),
-        ]
     }
 }
 

@@ -118,7 +118,7 @@ impl Parameters {
             all.push(named("specimen B's inertia", 0.0, SPECIMEN_KG * lever, Cause::Noise));
         }
         for (specimen, side) in specimens.iter().zip(["A", "B"]) {
-            all.extend(specimen.parameters(side));
+            all.extend(of_specimen(specimen, side));
         }
         all.push(named("the compliance of specimen B and its clamp", 0.0, TIP_M_PER_N, Cause::Bending));
         let [turn, sigma] = TURN_PER_M;
@@ -159,6 +159,18 @@ impl Parameters {
     pub fn start(&self) -> Vec<f64> {
         self.0.iter().map(|p| p.start).collect()
     }
+}
+
+/// The parameters of a specimen's shape.
+fn of_specimen(specimen: &Specimen, side: &str) -> [Parameter; elastic::TERMS] {
+    let named = |what: &str, [start, sigma]: [f64; 2]| {
+        Parameter::new(format!("{what} of specimen {side}"), start, sigma, Cause::Bending)
+    };
+    [
+        named("the shear compliance", specimen.shear_per_n),
+        named("the ratio of bending to shear", specimen.bending_per_m2),
+        named("the distance between contact and clamp", [specimen.clamp_m, 0.0]),
+    ]
 }
 
 /// z component of the force of a hit on B alone, per newton of the hammer: the direction's z with
