@@ -4,9 +4,10 @@
 use crate::frf::Frf;
 use crate::interruptible::Stopped;
 use crate::record::Record;
-use crate::writing::{self, Arrays, calibrations};
+use crate::writing::{self, Arrays, Recorded, calibrations};
 use crate::{in_the_process_that_loaded_this, interruptible, raised, values};
 use jointrig::analyse::{AnalyseError, CampaignFile, KnownContact, Wanted};
+use jointrig::campaign::cut::Only;
 use jointrig::campaign::plan::level::Level;
 use jointrig::campaign::plan::{configuration_named, structure};
 use jointrig::campaign::run::progress;
@@ -174,6 +175,43 @@ impl Lab {
         found.set_item("hits", added.hits)?;
         found.set_item("kept", added.kept)?;
         found.set_item("already", added.already)?;
+        found.set_item("verdicts", verdicts)?;
+        Ok(found)
+    }
+
+    /// Cuts a continuous recording into hits; jointrig's stub file describes the arguments.
+    #[pyo3(signature = (*, fs_hz, channels, configuration=None, impact=None, response=None, order=None, marker=None, table=None,
+                        units=None, scale=None, delay_s=None, calibrate="", source="python", replace=false, dry_run=false))]
+    #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
+    fn cut<'py>(
+        &self,
+        py: Python<'py>,
+        fs_hz: f64,
+        channels: Bound<'py, PyDict>,
+        configuration: Option<&str>,
+        impact: Option<&str>,
+        response: Option<&str>,
+        order: Option<&str>,
+        marker: Option<&str>,
+        table: Option<&str>,
+        units: Option<Bound<'py, PyDict>>,
+        scale: Option<Bound<'py, PyDict>>,
+        delay_s: Option<Bound<'py, PyDict>>,
+        calibrate: &str,
+        source: &str,
+        replace: bool,
+        dry_run: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let arrays = Arrays { fs_hz, force_n: None, channels, units, scale, delay_s };
+        let (channels, calibrate) = (arrays.read(py, &["sample"])?, calibrations(py, calibrate)?);
+        let only = Only { configuration, impact, response };
+        let by = Recorded { only, order, marker, table, source, replace, dry_run };
+        let (report, stored, verdicts) = writing::cut(py, &self.path, &by, channels, &calibrate)?;
+        let found = PyDict::new(py);
+        found.set_item("report", report)?;
+        found.set_item("hits", stored.hits)?;
+        found.set_item("kept", stored.kept)?;
+        found.set_item("already", stored.already)?;
         found.set_item("verdicts", verdicts)?;
         Ok(found)
     }

@@ -2,6 +2,10 @@
 //! functions as the command's import.
 
 use crate::{in_the_process_that_loaded_this, raised};
+use jointrig::campaign::cut::import::{self as cutting, Places, Stored, Terms};
+use jointrig::campaign::cut::marker::Marker;
+use jointrig::campaign::cut::recording::LongRecording;
+use jointrig::campaign::cut::{CutError, Only};
 use jointrig::campaign::import::assign::{Calibrations, assigned};
 use jointrig::campaign::import::channel_file::{ChannelFile, FileChannel};
 use jointrig::campaign::import::{
@@ -11,11 +15,11 @@ use jointrig::campaign::plan::level::{Level, Moment};
 use jointrig::campaign::plan::{Plan, configuration_name};
 use jointrig::campaign::store::Store;
 use jointrig::campaign::verdict::Judgement;
-use jointrig::device::channels::ChannelMap;
 use jointrig::device::samples::{ChannelSamples, ChannelView, SampleType, Samples};
 use numpy::{Element, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::fmt::Debug;
 use std::path::Path;
 
 /// The arrays of hits or of a level, and what Python states about them: each dict has the channels'
@@ -150,9 +154,10 @@ fn hits(samples: &Bound<'_, PyAny>, scale: f64) -> Option<Vec<ChannelSamples>> {
         .or_else(|| rows(samples, |hit| ChannelSamples::F64(scaled(hit))))
 }
 
-/// Identifies the arrays, so that a second call with the same ones stores nothing.
-fn origin(name: &str, map: &ChannelMap, all: &[Samples]) -> Origin {
-    let mut bytes: Vec<Vec<u8>> = vec![format!("{map:?}").into_bytes()];
+/// Identifies the arrays by their description and samples, so that a second call with the same ones
+/// stores nothing.
+fn origin(name: &str, described: &impl Debug, all: &[Samples]) -> Origin {
+    let mut bytes: Vec<Vec<u8>> = vec![format!("{described:?}").into_bytes()];
     for view in all.iter().flat_map(Samples::each) {
         bytes.push(match view {
             ChannelView::I16(own) => own.iter().flat_map(|v| v.to_le_bytes()).collect(),
@@ -257,6 +262,85 @@ pub fn add_level(
         Ok(added)
     });
     added.map_err(|error: ImportError| failed(py, path, &error))
+}
+
+/// How Python states the places.
+const TERMS: Terms = Terms {
+    order: "order=\"plan\"",
+    marker: "marker=\"CHANNEL:STEP\"",
+    table: "table=, the text of a CSV file",
+    place: "configuration=, impact= and response=",
+};
+
+/// What Python states about a continuous recording.
+pub struct Recorded<'s> {
+    pub only: Only<'s>,
+    pub order: Option<&'s str>,
+    pub marker: Option<&'s str>,
+    pub table: Option<&'s str>,
+    pub source: &'s str,
+    pub replace: bool,
+    pub dry_run: bool,
+}
+
+/// Place, number, verdict and sentence of a stored hit.
+pub type CutVerdict = (String, u32, &'static str, String);
+
+/// Cuts a continuous recording; returns what was found, the counts of stored hits, and the verdict
+/// of each.
+pub fn cut(
+    py: Python<'_>,
+    path: &Path,
+    by: &Recorded<'_>,
+    channels: ChannelFile,
+    calibrate: &Calibrations,
+) -> PyResult<(Vec<String>, Stored, Vec<CutVerdict>)> {
+    in_the_process_that_loaded_this(py)?;
+    let plan = plan(py, path)?;
+    if let Some(order) = by.order.filter(|order| *order != "plan") {
+        return Err(raised::refused(py, &format!("order is `{order}`: \"plan\" is the only one")));
+    }
+    let marker: Option<Marker> = by
+        .marker
+        .map(|text| text.parse().map_err(|what: String| raised::refused(py, &format!("marker: {what}"))))
+        .transpose()?;
+    let mut verdicts = Vec::new();
+    let done = py.detach(|| -> Result<_, CutError> {
+        let places = Places {
+            only: by.only,
+            in_order: by.order.is_some(),
+            table: by.table.map(|text| ("table", text)),
+            marker: marker.as_ref(),
+            terms: &TERMS,
+        };
+        cutting::stated_places(&plan, &places)?;
+        let origin = origin(by.source, &(channels.fs_hz, &channels.channels), &channels.hits);
+        let recording = LongRecording::in_memory(by.source, &plan, channels, calibrate)?;
+        let cut = cutting::cut(&recording, &plan, &places, &mut |_, _| {})?;
+        if by.dry_run {
+            return Ok((cut.report, Stored::default()));
+        }
+        let mut store = Store::open(path)?;
+        let mut tell = |place: &str, hit: u32, verdict: &Judgement| {
+            verdicts.push((place.to_owned(), hit, verdict.kind.name(), verdict.sentence.clone()));
+        };
+        let stored = cutting::store(
+            &recording,
+            (&cut, &plan),
+            (&mut store, &origin),
+            by.replace,
+            &mut tell,
+            &mut |_| {},
+        )?;
+        store.close()?;
+        Ok((cut.report, stored))
+    });
+    let (report, stored) = done.map_err(|error| match error {
+        CutError::Store(error) => raised::file(py, path, &error),
+        CutError::Import(error) => failed(py, path, &error),
+        other => raised::refused(py, &other.to_string()),
+    })?;
+    Ok((report, stored, verdicts))
 }
 
 /// Sensitivities in the form of the command's `--calibrate`.

@@ -1,6 +1,7 @@
 """Hits and levels that Python adds are judged and stored as the command's."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,6 +92,37 @@ def test_what_cannot_be_used_is_refused_and_nothing_is_stored(small_file: Path, 
     with pytest.raises(jr.FileError, match="exist"):
         jr.new(lab.path, tmp_path / "plan.toml")
     assert lab.records() == []
+
+
+def test_a_continuous_recording_is_cut_as_by_the_command(small_file: Path, tmp_path: Path) -> None:
+    lab, measured = empty(tmp_path), jr.open(small_file)
+    cells: dict[tuple[str, str, str], list[jr.Record]] = {}
+    for record in measured.records(kept=True):
+        cells.setdefault((record.configuration, record.impact, record.response), []).append(record)
+    (one, first), (two, second) = list(cells.items())[:2]
+    hits, names = [*first, *second], first[0].channels
+    # a second of silence between the records
+    quiet = np.zeros(int(first[0].fs_hz))
+    channels = {name: np.concatenate([part for hit in hits for part in (quiet, hit.signal(name))] + [quiet]) for name in names}
+    given: dict[str, Any] = {"fs_hz": first[0].fs_hz, "channels": channels, "units": UNITS}
+    with pytest.raises(jr.Refused, match='order="plan" .* marker="CHANNEL:STEP"'):
+        lab.cut(**given)
+    with pytest.raises(jr.Refused, match='order is `time`: "plan" is the only one'):
+        lab.cut(**given, order="time")
+    with pytest.raises(jr.Refused, match="CHANNEL:STEP"):
+        lab.cut(**given, marker="ai7")
+    rows = [",".join((str(number + 1), *(one if number < len(first) else two))) for number in range(len(hits))]
+    table = "\n".join(["hit,configuration,impact,response", *rows]) + "\n"
+    listed = lab.cut(**given, table=table, dry_run=True)
+    assert f"{len(hits)} hits" in listed["report"][0] and listed["hits"] == 0 and lab.records() == []
+    added = lab.cut(**given, table=table)
+    assert (added["hits"], added["kept"], added["already"]) == (len(hits), len(hits), 0)
+    assert [verdict for _, _, verdict, _ in added["verdicts"]] == ["good"] * len(hits)
+    assert lab.cut(**given, table=table)["already"] == len(hits)
+    for cell, own in ((one, first), (two, second)):
+        stored = lab.records(configuration=cell[0], impact=cell[1], response=cell[2])
+        assert [record.signal("force").max() for record in stored] == [record.signal("force").max() for record in own]
+    command("campaign", "verify", lab.path, "--deep")
 
 
 def test_a_level_is_measured_from_its_samples(tmp_path: Path) -> None:

@@ -54,6 +54,34 @@ class Lab:
         with the same arrays) and verdicts, a list of (verdict, sentence). source names the origin in the file; replace drops
         the good hits that came from another content with this name. Raises Refused, and stores nothing then.
         """
+    def cut(
+        self,
+        *,
+        fs_hz: float,
+        channels: dict[str, Any],
+        configuration: str | None = None,
+        impact: str | None = None,
+        response: str | None = None,
+        order: str | None = None,
+        marker: str | None = None,
+        table: str | None = None,
+        units: dict[str, str] | None = None,
+        scale: dict[str, float] | None = None,
+        delay_s: dict[str, float] | None = None,
+        calibrate: str = "",
+        source: str = "python",
+        replace: bool = False,
+        dry_run: bool = False,
+    ) -> dict[str, Any]:
+        """Finds the hits of one continuous recording and stores them at their places, as `jointrig import --cut` does.
+
+        channels: as for add_hits, but (sample,). The places: configuration, impact and response name one; order="plan" says
+        that they were struck in the plan's order; marker="CHANNEL:STEP" names a channel whose level is STEP times the place's
+        number in the plan, from 1; table is the text of a CSV table with the columns hit (or time_s), configuration, impact,
+        response. Returns report (what was found, line by line), hits, kept, already and verdicts, a list of (place, hit, verdict,
+        sentence). Raises Refused, with what was found and what to state, where a place is not certain, and stores nothing
+        then; dry_run stores nothing in any case.
+        """
     def add_level(
         self,
         frequency_hz: float,
