@@ -8,7 +8,7 @@ use jointrig::results::Results;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table};
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
-use jointrig_tests::rigs::{Drawn, Elastic, by_hand_plan, contact_plan, near_instead_plan, near_plan};
+use jointrig_tests::rigs::{Drawn, by_hand_plan, contact_plan, near_instead_plan, near_plan};
 use jointrig_tests::slip_truth::slid;
 use std::path::Path;
 
@@ -144,32 +144,6 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
     // the position errors of spots and points leave 2.5 % rms; the limit allows for the scatter of
     // two draws
     assert!(rms < 0.06 && half < 0.15, "{rows:?}");
-}
-
-#[test]
-fn the_bulk_of_specimens_that_bend_is_not_taken_for_the_contact() {
-    // an aluminium specimen, about which the plan states nothing
-    let like = Drawn { elastic: Some(Elastic::SpecimensAndArms), ..Drawn::default() };
-    let campaign = DrawnCampaign { number: 1001, seed: 0, like };
-    let row = row(campaign, campaign.results(contact_plan, |_, _, _| {}));
-    let Estimate { truth, found } = row.stiffness;
-    let [_, low, high] = found.unwrap_or_else(|| panic!("{row:?}"));
-    assert!(low <= truth && truth <= high && high - low < 0.4 * truth, "{row:?}");
-}
-
-#[test]
-#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: specimens that bend"]
-fn contacts_of_specimens_that_bend() {
-    let (first, rigs) = (count("FIRST", 1000), count("RIGS", 36));
-    let mut rows = Vec::new();
-    for (name, which) in
-        [("specimens", Elastic::Specimens), ("specimens and arms", Elastic::SpecimensAndArms)]
-    {
-        println!("{name} bend");
-        let like = Drawn { elastic: Some(which), ..Drawn::default() };
-        rows.extend(lines(name, &campaigns(first, rigs, 1, like, told)));
-    }
-    print_table("bending", &columns("what bends"), &rows);
 }
 
 /// Hits of about 50 N with a slip limit of 15 N.

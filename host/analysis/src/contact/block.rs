@@ -8,7 +8,7 @@
 //! time, so that several cells have the same hits: the signals that all cells contain (T and the
 //! spots) count in the first of them only.
 
-use super::parameters::{Cause, DELAYS, ELASTIC, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
+use super::parameters::{Cause, DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
 use super::{ContactError, ContactPriors, Input};
 use crate::band::Band;
 use crate::frf::MotionQuantity;
@@ -340,7 +340,7 @@ fn block(
 ) -> Result<Block, ContactError> {
     let priors = &input.priors;
     let alone = impact.structure == Structure::B;
-    let mut own: Vec<usize> = if alone { (FORM..ELASTIC).collect() } else { (0..SPOTS).collect() };
+    let mut own: Vec<usize> = if alone { (FORM..SPOTS).collect() } else { (0..SPOTS).collect() };
     own.extend(SPOTS..SPOTS + 4);
     own.extend(GAINS..GAINS + 5);
     own.extend(DELAYS..DELAYS + 5);

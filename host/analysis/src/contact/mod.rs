@@ -9,9 +9,8 @@
 //!    form of T and of arm B's motion at the contact (z_B, θ_x, θ_y), with terms in 1, s and s²,
 //!    which covers any mass, rod and load-cell gain. In the assembly the same form gives the
 //!    contact's force.
-//! 2. **Rotation.** Points on specimen A show its motion, arm B's points that of B. A specimen also
-//!    bends and shears in proportion to the force (`elastic`): k_T is the stiffness between the two
-//!    surfaces, and the bulk between them and the sensors is fitted, not counted as contact. The points are those of a 3-D vibrometer, or fixed sensors (accelerometers) with known
+//! 2. **Rotation.** Points on specimen A show its motion as a rigid body; arm B's points show that
+//!    of B. The points are those of a 3-D vibrometer, or fixed sensors (accelerometers) with known
 //!    positions and axes; then spots next to the contact are not needed.
 //! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells
 //!    together. The motion of the bodies is eliminated at every line (`model`), so that noise in
@@ -23,7 +22,6 @@
 //!
 //! - `block`: the measured signals of each cell, and the cells of an impact
 //! - `parameters`: the unknowns
-//! - `elastic`: how a specimen bends under the contact's force
 //! - `model`: the signals of a line as a linear map of the motion, and its elimination
 //! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell
 //!   beyond its noise
@@ -36,7 +34,6 @@ use std::f64::consts::TAU;
 
 mod block;
 mod driven;
-mod elastic;
 #[cfg(test)]
 mod fixed_tests;
 mod levels;
@@ -50,7 +47,6 @@ mod solver;
 mod tests;
 
 pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
-pub use elastic::Specimen;
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
 };
@@ -62,7 +58,7 @@ use crate::substructuring::geometry::Grouping;
 use block::{Block, Group, POINT, blocks};
 use nalgebra::DVector;
 use outcome::{Variances, of_sum, trusted};
-use parameters::{FORM, Parameters, TIP_B};
+use parameters::{FORM, Parameters};
 use solver::Certainty;
 use solver::Solution;
 
@@ -88,8 +84,6 @@ pub struct Input<'a> {
     /// Positions of the vibrometer spots next to the contact, on A and on B, m; none if only the
     /// points measure the specimens.
     pub spots_m: Option<[[f64; 3]; 2]>,
-    /// What the plan states of the bulk of specimens A and B; `None` if nothing.
-    pub specimens: [Option<Specimen>; 2],
     /// Prior knowledge.
     pub priors: ContactPriors,
     /// The band of the lines used.
@@ -97,26 +91,6 @@ pub struct Input<'a> {
 }
 
 impl Input<'_> {
-    /// What is known of specimens A and B. Without points on B, its surface deviates from arm B by
-    /// parameters of their own (`TIP_B`), which stand for its bulk.
-    fn known_specimens(&self) -> [Specimen; 2] {
-        let points = [Grouping::SpecimenA, Grouping::SpecimenB];
-        std::array::from_fn(|side| {
-            let own = self.cells.iter().filter(|cell| cell.point_grouping == points[side]);
-            let height = |cell: &ContactCell<'_>| (cell.point_m[1] - self.contact_m[1]).abs();
-            match own.map(height).reduce(f64::max) {
-                None => Specimen::RIGID,
-                Some(farthest_m) => self.specimens[side].unwrap_or_else(|| Specimen::unstated(farthest_m)),
-            }
-        })
-    }
-
-    /// Whether nothing measures specimen B itself: then its bulk and its clamp are part of k_T.
-    fn includes_specimen_b(&self) -> bool {
-        let on_b = self.cells.iter().any(|cell| cell.point_grouping == Grouping::SpecimenB);
-        !on_b && !self.cells.iter().any(ContactCell::has_spots)
-    }
-
     /// Positions of the spots relative to the contact, m.
     fn spots_from_contact(&self) -> Option<[[f64; 3]; 2]> {
         let relative = |spot: [f64; 3]| std::array::from_fn(|axis| spot[axis] - self.contact_m[axis]);
@@ -249,8 +223,7 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         return Err(ContactError::NoSpots);
     }
     // without spots no signal depends on their positions
-    let mut parameters =
-        Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default(), input.known_specimens());
+    let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default());
     let mut blocks = blocks(input, &mut parameters)?;
     if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
         return Err(ContactError::NoForce);
@@ -266,10 +239,6 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         )));
     }
     scale_form(&mut parameters, &blocks);
-    if input.includes_specimen_b() {
-        // no signal separates it from the contact
-        parameters.narrow(TIP_B, 0.0);
-    }
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })

@@ -3,18 +3,14 @@
 //! parameters.
 //!
 //! The motion is that of rigid bodies: arm B (t, θ), specimen A (t, θ) and, if it has points of its
-//! own, specimen B. Motion of a specimen is that of its surface at the contact; the rest of it
-//! deviates from that by its bending and shear, which are proportional to F (`elastic`). Without
-//! points of its own, specimen B's surface deviates from arm B in proportion to F. The contact
-//! couples the surfaces: z_A − z_B = F/(k_T + s c_T) at the contact itself,
+//! own, specimen B. The contact couples them: z_A − z_B = F/(k_T + s c_T) at the contact itself,
 //! with F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y). So z_A is not an independent
 //! coordinate but follows from T and B's motion; on B alone, where F is the hammer's, T follows
 //! from B's motion.
 
 use super::block::{Axis, Block, BlockCell, BlockLine, ChannelRow, Group, POINT};
-use super::elastic::{self, Deflected, Shape};
 use super::parameters::{
-    COMPLIANCE, DELAYS, ELASTIC, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS, TIP_B,
+    COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS,
 };
 use crate::C;
 use nalgebra::{DMatrix, DVector};
@@ -61,20 +57,6 @@ fn dot(of: &Linear, x: &DVector<C>) -> C {
     of.iter().zip(x.iter()).map(|(a, b)| a * b).sum()
 }
 
-/// Displacement of a point per newton of the contact's force due to the specimen's bending and
-/// shear, m/N.
-struct Bulk {
-    moved: [f64; 3],
-    /// Its derivatives: (parameter, value).
-    by: Vec<(usize, [f64; 3])>,
-    /// Its derivatives by the point's coordinates.
-    by_place: [[f64; 3]; 3],
-}
-
-fn along(direction: [f64; 3], moved: [f64; 3]) -> f64 {
-    direction.iter().zip(moved).map(|(d, m)| d * m).sum()
-}
-
 /// Displacement along `axis` of a point of a body: t + θ × r, with the body's rotation θ.
 fn turned(translation: &Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> Linear {
     let mut moved = *translation;
@@ -89,7 +71,7 @@ impl<'a> LineModel<'a> {
     /// The map with the parameters `p` at s.
     pub fn new(block: &'a Block, p: &'a [f64], s: C) -> Self {
         let z_arm = unit(2);
-        let mut z_b = block.specimen_b().map_or(z_arm, |at| unit(at + 2));
+        let z_b = block.specimen_b().map_or(z_arm, |at| unit(at + 2));
         let coefficient = |n: usize| C::from(p[FORM + n]);
         let a_t = coefficient(0) + coefficient(1) * s;
         let of_motion = |n: usize| coefficient(n) + coefficient(n + 1) * s + coefficient(n + 2) * s * s;
@@ -111,13 +93,9 @@ impl<'a> LineModel<'a> {
             (t, p[along_z] / a_t, [C::default(); MOST], [C::default(); MOST])
         } else {
             let t = unit(T);
-            let one = C::new(1.0, 0.0);
-            let force = sum(&[(a_t, &t), (one, &rest)]);
-            if block.specimen_b().is_none() {
-                z_b = sum(&[(one, &z_b), (C::from(p[TIP_B]), &force)]);
-            }
+            let force = sum(&[(a_t, &t), (C::new(1.0, 0.0), &rest)]);
             let compliance = p[COMPLIANCE] / (1.0 + s * p[RETARDATION]);
-            let z_a = sum(&[(one, &z_b), (compliance, &force)]);
+            let z_a = sum(&[(C::new(1.0, 0.0), &z_b), (compliance, &force)]);
             (t, C::default(), force, z_a)
         };
         LineModel { block, p, s, z_b, force, z_a, t, t_offset, a_t, hammer: 1.0 }
@@ -203,39 +181,6 @@ impl<'a> LineModel<'a> {
         }
     }
 
-    /// Displacement of a cell's point per newton of the contact's force, beyond that of the surface
-    /// at the contact; none on arm B.
-    fn bulk(&self, cell: &BlockCell) -> Option<Bulk> {
-        (cell.group != Group::ArmB).then(|| self.bulk_at(cell.group == Group::SpecimenA, self.position(cell)))
-    }
-
-    /// The same for a spot.
-    fn bulk_of_spot(&self, of_a: bool) -> Bulk {
-        let (_, _, place) = self.spot(of_a);
-        let mut bulk = self.bulk_at(of_a, place);
-        if !of_a && self.block.specimen_b().is_none() {
-            // the surface turns relative to arm B
-            let (tip, turn) = (self.p[TIP_B], self.p[TIP_B + 1]);
-            let y = place[1];
-            bulk.moved[2] += tip * turn * y;
-            bulk.by.extend([(TIP_B, [0.0, 0.0, turn * y]), (TIP_B + 1, [0.0, 0.0, tip * y])]);
-            bulk.by_place[1][2] += tip * turn;
-        }
-        bulk
-    }
-
-    fn bulk_at(&self, of_a: bool, r: [f64; 3]) -> Bulk {
-        let (first, side) = if of_a { (ELASTIC, 1.0) } else { (ELASTIC + elastic::TERMS, -1.0) };
-        let Deflected { value, by, along } = Shape::new(&self.p[first..]).at(r[1], side);
-        // a rotation about x moves a point at z by −θ z along y
-        let moved = |[z, turn]: elastic::Deflection| [0.0, -turn * r[2], z];
-        Bulk {
-            moved: moved(value),
-            by: by.into_iter().enumerate().map(|(n, by)| (first + n, moved(by))).collect(),
-            by_place: [[0.0; 3], moved(along), [0.0, -value[1], 0.0]],
-        }
-    }
-
     /// The map, with one row for each of the block's rows, and the rows' values without any motion.
     pub fn map(&self) -> (DMatrix<C>, Vec<C>) {
         let rows: Vec<Linear> = self.block.rows.iter().map(|row| self.row(row.cell, row.channel)).collect();
@@ -250,9 +195,7 @@ impl<'a> LineModel<'a> {
             0 => self.t,
             1 | 2 => {
                 let (z, theta, place) = self.spot(channel == 2);
-                let factor = self.of_spot(2 - channel);
-                let bulk = factor * self.bulk_of_spot(channel == 2).moved[2];
-                sum(&[(factor, &turned(&z, theta, place, 2)), (bulk, &self.force)])
+                sum(&[(self.of_spot(2 - channel), &turned(&z, theta, place, 2))])
             }
             _ => {
                 let cell = &self.block.cells[cell];
@@ -260,11 +203,8 @@ impl<'a> LineModel<'a> {
                 let (moved, _) = self.point(cell);
                 let factor = self.sensor(axis.gain, axis.delay);
                 let parts = self.direction(axis).map(|part| factor * part);
-                let mut terms: Vec<(C, &Linear)> =
+                let terms: Vec<(C, &Linear)> =
                     parts.into_iter().zip(&moved).filter(|(part, _)| *part != C::default()).collect();
-                if let Some(bulk) = self.bulk(cell) {
-                    terms.push((factor * along(self.direction(axis), bulk.moved), &self.force));
-                }
                 sum(&terms)
             }
         }
@@ -283,25 +223,14 @@ impl<'a> LineModel<'a> {
         let force = dot(&self.force, x);
         let damped = 1.0 + self.s * self.p[RETARDATION];
         let compliance = self.p[COMPLIANCE] / damped;
-        // without points on B, its surface at the contact deviates from arm B
-        let tip = if self.block.specimen_b().is_none() { self.p[TIP_B] } else { 0.0 };
-        // derivatives of a specimen's z at the contact by the contact itself, and of everything
-        // that follows the force by the form, with the factor of F
-        let of_z = |of_a: bool, factor: C, bulk: C, row: &mut Sparse| {
-            let mut of_force = bulk + factor * tip;
-            if of_a {
-                row.push((local(COMPLIANCE), factor * force / damped));
-                row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
-                of_force += factor * compliance;
-            }
-            if self.block.specimen_b().is_none() {
-                row.push((local(TIP_B), factor * force));
-            }
+        // derivatives of z_A at the contact by everything that it depends on
+        let of_z_a = |factor: C, row: &mut Sparse| {
+            row.push((local(COMPLIANCE), factor * force / damped));
+            row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
             for (n, term) in terms.iter().enumerate() {
-                row.push((local(FORM + n), of_force * term));
+                row.push((local(FORM + n), factor * compliance * term));
             }
         };
-        let assembled = self.block.along_z.is_none();
         let mut all = Vec::with_capacity(self.block.rows.len());
         for (r, row) in self.block.rows.iter().enumerate() {
             let mut own = Sparse::with_capacity(24);
@@ -327,13 +256,10 @@ impl<'a> LineModel<'a> {
                     let factor = self.of_spot(spot);
                     let (_, theta, _) = self.spot(of_a);
                     let at = SPOTS + if of_a { 0 } else { 2 };
-                    let bulk = self.bulk_of_spot(of_a);
                     own.push((local(at), -factor * x[theta[1]]));
-                    own.push((local(at + 1), factor * (x[theta[0]] + force * bulk.by_place[1][2])));
-                    if assembled {
-                        let by = bulk.by.iter();
-                        own.extend(by.map(|(at, by)| (local(*at), factor * force * by[2])));
-                        of_z(of_a, factor, factor * bulk.moved[2], &mut own);
+                    own.push((local(at + 1), factor * x[theta[0]]));
+                    if of_a {
+                        of_z_a(factor, &mut own);
                     }
                 }
                 channel => {
@@ -342,15 +268,10 @@ impl<'a> LineModel<'a> {
                     let factor = self.sensor(axis.gain, axis.delay);
                     let d = self.direction(axis);
                     let (moved, theta) = self.point(cell);
-                    let bulk = self.bulk(cell).filter(|_| assembled);
                     // d · (θ × r) = r · (d × θ)
                     for place in 0..3 {
                         let (next, last) = ((place + 1) % 3, (place + 2) % 3);
-                        let mut by = d[next] * x[theta[last]] - d[last] * x[theta[next]];
-                        if let Some(bulk) = &bulk {
-                            by += force * along(d, bulk.by_place[place]);
-                        }
-                        let by = factor * by;
+                        let by = factor * (d[next] * x[theta[last]] - d[last] * x[theta[next]]);
                         if by != C::default() {
                             for base in std::iter::once(cell.point).chain(cell.aim) {
                                 own.push((local(base + place), by));
@@ -359,21 +280,14 @@ impl<'a> LineModel<'a> {
                     }
                     if let Some((at, across)) = &axis.across {
                         for (k, across) in across.iter().enumerate() {
-                            let mut seen: C =
+                            let along: C =
                                 across.iter().zip(&moved).map(|(part, of)| part * dot(of, x)).sum();
-                            if let Some(bulk) = &bulk {
-                                seen += force * along(*across, bulk.moved);
-                            }
-                            own.push((local(at + k), factor * seen));
+                            own.push((local(at + k), factor * along));
                         }
                     }
-                    if let Some(bulk) = &bulk {
-                        own.extend(
-                            bulk.by.iter().map(|(at, by)| (local(*at), factor * force * along(d, *by))),
-                        );
-                        let of_a = cell.group == Group::SpecimenA;
-                        let of_surface = if of_a { factor * d[2] } else { C::default() };
-                        of_z(of_a, of_surface, factor * along(d, bulk.moved), &mut own);
+                    let of_z = self.of_z_a(row);
+                    if of_z != C::default() {
+                        of_z_a(of_z, &mut own);
                     }
                 }
             }
@@ -392,10 +306,9 @@ impl<'a> LineModel<'a> {
     fn form_terms(&self, x: &DVector<C>) -> [C; FORM_TERMS + INERTIA_TERMS] {
         let (s, t) = (self.s, dot(&self.t, x) + self.t_offset);
         let (z, turn_x, turn_y) = (x[2], x[3], x[4]);
-        // without points of its own specimen B has the inertia of its arm
-        let against_the_arm = self.block.specimen_b().map_or([C::default(); 3], |b| {
-            [dot(&self.z_b, x) - z, x[b + 3] - turn_x, turn_y - x[b + 4]].map(|moved| s * s * moved)
-        });
+        let b = self.block.specimen_b().unwrap_or(0);
+        let against_the_arm =
+            [dot(&self.z_b, x) - z, x[b + 3] - turn_x, turn_y - x[b + 4]].map(|moved| s * s * moved);
         [
             t,
             s * t,

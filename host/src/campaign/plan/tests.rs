@@ -163,8 +163,6 @@ fn what_may_be_left_out_is_checked_where_it_stands() {
         ("[shaker]\nfrequencies_hz = [100]\namplitudes_m = [0.1]", "shaker.amplitudes_m"),
         ("[contact]\nnormal_load_n = 0", "contact: normal_load_n"),
         ("[contact]\nparallel_path = 1.0133", "contact.parallel_path"),
-        ("[specimens]\na = { section_m = [18, 14], clamp_m = 12, young_pa = 2e11 }", "not in mm"),
-        ("[specimens]\nb = { section_m = [0.018, 0.014], clamp_m = 0.012, young_pa = 210 }", "not in GPa"),
         ("[shaker]\nfrequencies_hz = []\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[shaker]\nfrequencies_hz = [6000]\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[enough]\nrandom_error = 2.0\nband_hz = [100, 800]", "enough.random_error"),
