@@ -1,12 +1,16 @@
-"""Latency and processor load of a campaign over the bridge: 19 channels of 24 bits at 51.2 kHz, in real time.
+"""Latency and processor load of a campaign over the bridge, in real time.
+
+19 channels of 24 bits at 51.2 kHz.
 
     JOINTRIG_BIN=… JOINTRIG_HIL_SIM_BIN=… python benches/bridge_load.py [SECONDS]
 
-Needs Linux, the wheel and an idle computer. A Python program reads the simulated rig's volts, which come as a recorder
-delivers them (blocks of 50 ms, never waiting), and writes them with jointrig.bridge. Printed are
-- the latency of each hit: from the write of the block with the last sample of its record to the moment when the record, which
-  contains its verdict, can be read from the campaign file;
-- the time that the host's process takes on the processor, per second, and that of its threads. The program is not in it.
+Needs Linux, the wheel and an idle computer. A Python program reads the simulated rig's volts, which
+come as a recorder delivers them (blocks of 50 ms, never waiting), and writes them with
+jointrig.bridge. Printed are
+- the latency of each hit: from the write of the block with the last sample of its record to the
+  moment when the record, which contains its verdict, can be read from the campaign file;
+- the time that the host's process takes on the processor, per second, and that of its threads. The
+  program is not in it.
 """
 
 from __future__ import annotations

@@ -239,9 +239,9 @@ impl Blocks<'_> {
         for _ in 0..scans {
             rig.scan(&mut words);
             let (upper, lower) = words.split_at(channels.len());
-            let mut lower = lower.iter();
+            let mut lower = lower.iter().peekable();
             for (upper, channel) in upper.iter().zip(channels) {
-                let code = match lower.next() {
+                let code = match lower.next_if(|_| channel.is_wide()) {
                     Some(lower) => joined_code([*upper, *lower], channel.bits),
                     None => (*upper).into(),
                 };

@@ -53,7 +53,7 @@ const PARTS: [Budget; 8] = [
     budget("part.copy_480", "one copy of a block's samples (there are three on the way)", 600),
     budget("frame.seal_short", "CRC-32 and COBS of an acknowledgement", 500),
     budget("frame.read", "finding and checking a frame of the longest size", 20_000),
-    budget("greet", "a handshake, heard, answered and logged", 7_000),
+    budget("greet", "a handshake, received, answered and logged", 7_000),
 ];
 
 /// Instructions from the first byte of a request to the last byte of its answer.

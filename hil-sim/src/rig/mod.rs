@@ -89,8 +89,10 @@ pub struct Rig {
     truth: [f64; CHANNELS],
     coil_pulses_s: Vec<f64>,
     last_hit: Option<Hit>,
-    /// Scans and hits since the rig was started: only a contact that drifts depends on them.
-    total: (u64, u64),
+    /// Scans since the rig was started: only a contact that drifts depends on them.
+    total_scans: u64,
+    /// Hits since then, also only for such a contact.
+    total_hits: u64,
     /// The rig with its contact as it was when the cell was staged, if it drifts.
     drifted: Option<Box<RigConfig>>,
 }
@@ -150,7 +152,8 @@ impl Rig {
             truth: [0.0; CHANNELS],
             coil_pulses_s: Vec::new(),
             last_hit: None,
-            total: (0, 0),
+            total_scans: 0,
+            total_hits: 0,
             drifted: None,
             stepping,
             config: config.clone(),
@@ -210,7 +213,7 @@ impl Rig {
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
         let speckle = seen.speckle;
         let drifted = (configuration == Configuration::Ajb && self.config.contact.drifts()).then(|| {
-            let contact = self.config.contact.drifted(self.total.1, self.time_s(self.total.0));
+            let contact = self.config.contact.drifted(self.total_hits, self.time_s(self.total_scans));
             Box::new(RigConfig { contact, ..self.config.clone() })
         });
         let config = drifted.as_deref().unwrap_or(&self.config);
@@ -268,7 +271,7 @@ impl Rig {
         self.scans = 0;
         self.coil_pulses_s.push(pulse_s);
         self.last_hit = Some(hit);
-        self.total.1 += 1;
+        self.total_hits += 1;
         self.attempt = attempt.wrapping_add(1);
     }
 
@@ -342,7 +345,7 @@ impl Rig {
         }
         let (from_s, to_s) = (self.time_s(self.scans), self.time_s(self.scans + 1));
         self.scans += 1;
-        self.total.0 += 1;
+        self.total_scans += 1;
         let shaker_n = self.drive_v * self.config.shaker.gain_n_per_v;
         let forces = ScanForces { from_s, to_s, hammer: &self.pending, shaker_n };
         match &mut self.slipping {

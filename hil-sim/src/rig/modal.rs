@@ -189,8 +189,8 @@ impl StateSpace {
     /// From M, C and K.
     ///
     /// # Errors
-    /// [`RigError::Structure`] if M is not positive definite, the undamped modes do not converge, or
-    /// a beam has no modes.
+    /// [`RigError::Structure`] if M is not positive definite, the undamped modes do not converge,
+    /// or a beam has no modes.
     pub fn new(structure: &Structure) -> Result<Self, RigError> {
         structure.complete()?;
         let fail = |what| RigError::Structure { configuration: structure.configuration(), what };

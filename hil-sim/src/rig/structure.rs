@@ -1,8 +1,8 @@
 //! The structure: bodies joined by bushings, as M, C and K.
 //!
-//! A rigid body moves by q = (t, θ) at its centre of gravity; a point r of it by u = t + θ × (r −
-//! cg), that is D = [I, −skew(r − cg); 0, I]. A body that bends (`beam`) also has elastic
-//! modes, of which D then has further columns. A bushing between two bodies adds Dᵀ diag(k) D to K
+//! A rigid body moves by q = (t, θ) at its centre of gravity; a point r of it by
+//! u = t + θ × (r − cg), that is D = [I, −skew(r − cg); 0, I]. A body that bends (`beam`) also has
+//! elastic modes, of which D then has further columns. A bushing between two bodies adds Dᵀ diag(k) D to K
 //! and Dᵀ diag(β k) D to C with D = [−D₁, D₂]; ground is a zero row. Rigid bodies have six degrees
 //! of freedom: 18 in A, 6 in B, 24 in AJB. With a rigid clamp A the specimen is lumped onto arm A:
 //! six fewer in A and AJB. With a compliant clamp B, specimen B is a separate body: six more in B

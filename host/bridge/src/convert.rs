@@ -27,7 +27,7 @@ pub struct Converter {
     noise_scans: u64,
     /// Words of the converted scans.
     codes: Vec<i16>,
-    /// Lower words of the scan in hand.
+    /// Lower words of the scan that is being converted.
     lower: Vec<i16>,
     told_invalid: bool,
 }
@@ -163,7 +163,8 @@ impl Converter {
         remarks
     }
 
-    /// Converts one scan; the words of an incomplete one are left in `codes`; false when one of its samples is not a number.
+    /// Converts one scan; false when one of its samples is not a number, which leaves the words of an
+    /// incomplete scan in `codes`.
     fn scan(&mut self, bytes: &[u8], codes: &mut Vec<i16>, remarks: &mut Vec<String>) -> bool {
         let measures = self.noise_scans > 0;
         let samples = bytes.chunks_exact(self.sample.bytes());

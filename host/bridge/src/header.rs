@@ -17,7 +17,7 @@
 //! | `board`, `serial` | name and serial number of the recorder, the same in every run |
 //! | `rate_hz` | scans per second; need not be an integer |
 //! | `sample` | `i16`, `i32`, `f32` or `f64` |
-//! | `bits` | for `i32`: bits of a full scale, e.g. 24 for codes of ±2²³; 32 if absent. For `f32` and `f64`: resolution of the recorder; 24 if absent |
+//! | `bits` | of a full scale of `i32` (32 if absent); of the resolution of `f32`, `f64` (24) |
 //! | `held` | the source can wait (a file, a simulation); a recorder cannot; `false` if absent |
 //! | `hammer` | an output of the program may fire a hammer ([`Hammer`]); absent if none may |
 //! | `name` | of the channel, up to 24 bytes |

@@ -7,7 +7,6 @@ use crate::record::Record;
 use crate::writing::{self, Arrays, Recorded, calibrations};
 use crate::{in_the_process_that_loaded_this, interruptible, raised, values};
 use jointrig::analyse::{AnalyseError, CampaignFile, KnownContact, Wanted};
-use jointrig::campaign::cut::Only;
 use jointrig::campaign::plan::level::Level;
 use jointrig::campaign::plan::{configuration_named, structure};
 use jointrig::campaign::run::progress;
@@ -180,20 +179,21 @@ impl Lab {
     }
 
     /// Cuts a continuous recording into hits; jointrig's stub file describes the arguments.
-    #[pyo3(signature = (*, fs_hz, channels, configuration=None, impact=None, response=None, order=None, marker=None, table=None,
-                        units=None, scale=None, delay_s=None, calibrate="", source="python", replace=false, dry_run=false))]
+    #[pyo3(signature = (*, fs_hz, channels, configuration=None, impact=None, response=None, order=None,
+                        marker=None, table=None, units=None, scale=None, delay_s=None, calibrate="",
+                        source="python", replace=false, dry_run=false))]
     #[allow(clippy::too_many_arguments, reason = "Python names each of them")]
     fn cut<'py>(
         &self,
         py: Python<'py>,
         fs_hz: f64,
         channels: Bound<'py, PyDict>,
-        configuration: Option<&str>,
-        impact: Option<&str>,
-        response: Option<&str>,
-        order: Option<&str>,
-        marker: Option<&str>,
-        table: Option<&str>,
+        configuration: Option<String>,
+        impact: Option<String>,
+        response: Option<String>,
+        order: Option<String>,
+        marker: Option<String>,
+        table: Option<String>,
         units: Option<Bound<'py, PyDict>>,
         scale: Option<Bound<'py, PyDict>>,
         delay_s: Option<Bound<'py, PyDict>>,
@@ -204,9 +204,9 @@ impl Lab {
     ) -> PyResult<Bound<'py, PyDict>> {
         let arrays = Arrays { fs_hz, force_n: None, channels, units, scale, delay_s };
         let (channels, calibrate) = (arrays.read(py, &["sample"])?, calibrations(py, calibrate)?);
-        let only = Only { configuration, impact, response };
-        let by = Recorded { only, order, marker, table, source, replace, dry_run };
-        let (report, stored, verdicts) = writing::cut(py, &self.path, &by, channels, &calibrate)?;
+        let only = [configuration, impact, response];
+        let by = Recorded { only, order, marker, table, source: source.into(), replace, dry_run };
+        let (report, stored, verdicts) = writing::cut(py, &self.path, by, channels, calibrate)?;
         let found = PyDict::new(py);
         found.set_item("report", report)?;
         found.set_item("hits", stored.hits)?;

@@ -1,8 +1,9 @@
 //! Writing: a new campaign file, and hits and levels from arrays, judged and stored by the same
 //! functions as the command's import.
 
-use crate::{in_the_process_that_loaded_this, raised};
-use jointrig::campaign::cut::import::{self as cutting, Places, Stored, Terms};
+use crate::interruptible::Stopped;
+use crate::{in_the_process_that_loaded_this, interruptible, raised};
+use jointrig::campaign::cut::import::{self as cutting, Cut, Places, Stored, Terms};
 use jointrig::campaign::cut::marker::Marker;
 use jointrig::campaign::cut::recording::LongRecording;
 use jointrig::campaign::cut::{CutError, Only};
@@ -273,14 +274,41 @@ const TERMS: Terms = Terms {
 };
 
 /// What Python states about a continuous recording.
-pub struct Recorded<'s> {
-    pub only: Only<'s>,
-    pub order: Option<&'s str>,
-    pub marker: Option<&'s str>,
-    pub table: Option<&'s str>,
-    pub source: &'s str,
+pub struct Recorded {
+    /// Configuration, impact and response, as far as they are named.
+    pub only: [Option<String>; 3],
+    pub order: Option<String>,
+    pub marker: Option<String>,
+    /// Text of the table of places.
+    pub table: Option<String>,
+    pub source: String,
     pub replace: bool,
     pub dry_run: bool,
+}
+
+impl Recorded {
+    /// The hits and their places; a Ctrl-C ends the search.
+    fn found(
+        &self,
+        stopped: &Stopped,
+        plan: &Plan,
+        marker: Option<&Marker>,
+        channels: ChannelFile,
+        calibrate: &Calibrations,
+    ) -> Result<(LongRecording, Cut), CutError> {
+        let [configuration, impact, response] = self.only.each_ref().map(Option::as_deref);
+        let places = Places {
+            only: Only { configuration, impact, response },
+            in_order: self.order.is_some(),
+            table: self.table.as_deref().map(|text| ("table", text)),
+            marker,
+            terms: &TERMS,
+        };
+        cutting::stated_places(plan, &places)?;
+        let recording = LongRecording::in_memory(&self.source, plan, channels, calibrate)?;
+        let cut = cutting::cut(&recording, plan, &places, &mut |_, _| stopped.end_here_if_so())?;
+        Ok((recording, cut))
+    }
 }
 
 /// Place, number, verdict and sentence of a stored hit.
@@ -291,56 +319,47 @@ pub type CutVerdict = (String, u32, &'static str, String);
 pub fn cut(
     py: Python<'_>,
     path: &Path,
-    by: &Recorded<'_>,
+    by: Recorded,
     channels: ChannelFile,
-    calibrate: &Calibrations,
+    calibrate: Calibrations,
 ) -> PyResult<(Vec<String>, Stored, Vec<CutVerdict>)> {
     in_the_process_that_loaded_this(py)?;
     let plan = plan(py, path)?;
-    if let Some(order) = by.order.filter(|order| *order != "plan") {
+    if let Some(order) = by.order.as_deref().filter(|order| *order != "plan") {
         return Err(raised::refused(py, &format!("order is `{order}`: \"plan\" is the only one")));
     }
     let marker: Option<Marker> = by
         .marker
+        .as_deref()
         .map(|text| text.parse().map_err(|what: String| raised::refused(py, &format!("marker: {what}"))))
         .transpose()?;
+    let failed = |error: CutError| match error {
+        CutError::Store(error) => raised::file(py, path, &error),
+        CutError::Import(error) => failed(py, path, &error),
+        other => raised::refused(py, &other.to_string()),
+    };
+    let Recorded { replace, dry_run, .. } = by;
+    let (origin, plan, found) = interruptible::run(py, move |stopped| {
+        let origin = origin(&by.source, &(channels.fs_hz, &channels.channels), &channels.hits);
+        let found = by.found(stopped, &plan, marker.as_ref(), channels, &calibrate);
+        (origin, plan, found)
+    })?;
+    let (recording, cut) = found.map_err(failed)?;
     let mut verdicts = Vec::new();
-    let done = py.detach(|| -> Result<_, CutError> {
-        let places = Places {
-            only: by.only,
-            in_order: by.order.is_some(),
-            table: by.table.map(|text| ("table", text)),
-            marker: marker.as_ref(),
-            terms: &TERMS,
-        };
-        cutting::stated_places(&plan, &places)?;
-        let origin = origin(by.source, &(channels.fs_hz, &channels.channels), &channels.hits);
-        let recording = LongRecording::in_memory(by.source, &plan, channels, calibrate)?;
-        let cut = cutting::cut(&recording, &plan, &places, &mut |_, _| {})?;
-        if by.dry_run {
-            return Ok((cut.report, Stored::default()));
-        }
+    if dry_run {
+        return Ok((cut.report, Stored::default(), verdicts));
+    }
+    let stored = py.detach(|| -> Result<_, CutError> {
         let mut store = Store::open(path)?;
         let mut tell = |place: &str, hit: u32, verdict: &Judgement| {
             verdicts.push((place.to_owned(), hit, verdict.kind.name(), verdict.sentence.clone()));
         };
-        let stored = cutting::store(
-            &recording,
-            (&cut, &plan),
-            (&mut store, &origin),
-            by.replace,
-            &mut tell,
-            &mut |_| {},
-        )?;
+        let into = (&mut store, &origin);
+        let stored = cutting::store(&recording, (&cut, &plan), into, replace, &mut tell, &mut |_| {})?;
         store.close()?;
-        Ok((cut.report, stored))
+        Ok(stored)
     });
-    let (report, stored) = done.map_err(|error| match error {
-        CutError::Store(error) => raised::file(py, path, &error),
-        CutError::Import(error) => failed(py, path, &error),
-        other => raised::refused(py, &other.to_string()),
-    })?;
-    Ok((report, stored, verdicts))
+    Ok((cut.report, stored.map_err(failed)?, verdicts))
 }
 
 /// Sensitivities in the form of the command's `--calibrate`.

@@ -18,6 +18,25 @@ def command(*arguments: object, code: int = 0) -> subprocess.CompletedProcess[st
     return done
 
 
+def plan_of_one_place(path: Path, changes: list[tuple[str, str]]) -> Path:
+    """FRFs of one accelerometer at one place: the template `frf-only` with these replacements."""
+    command("plan", "new", path, "--template", "frf-only")
+    head, geometry = path.read_text().split("[geometry]")
+    away = ('"AY1"', '"AX1"', '"NB2"')
+    points = [line for line in geometry.splitlines() if not any(name in line for name in away)]
+    one = [
+        ('impacts = ["AZ1", "AY1", "AX1"]', 'impacts = ["AZ1"]'),
+        ('responses = ["NA1", "NB2"]', 'responses = ["NA1"]'),
+    ]
+    for old, new in [*changes, *one]:
+        assert old in head, old
+        head = head.replace(old, new)
+    text = head + "[geometry]" + "\n".join(points) + "\n"
+    axes = 'channels = ["na1_x", "na1_y", "na1_z"]'
+    path.write_text(text.replace(axes, 'axes = [[0, 0, 1]], channels = ["acc_z"]'))
+    return path
+
+
 def measured(folder: Path, template: str) -> Path:
     """A campaign of one of the plans that come with jointrig."""
     file = folder / "lab.jrig"

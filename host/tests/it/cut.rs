@@ -332,9 +332,8 @@ fn forty_minutes_with_double_missed_and_repeated_hits_are_named_right() {
     assert_eq!(check(&folder.join("c.jrig"), &person.strikes, RESPONSES), [200, 190]);
 }
 
-#[test]
-fn a_skipped_place_is_asked_about_and_a_table_answers() {
-    const RESPONSES: usize = 2;
+/// Four good hits at each of six places but the third.
+fn who_skips_the_third_place() -> Person {
     let mut person = Person::new(3);
     for place in [0, 1, 3, 4, 5] {
         for _ in 0..4 {
@@ -342,6 +341,13 @@ fn a_skipped_place_is_asked_about_and_a_table_answers() {
         }
         person.move_on();
     }
+    person
+}
+
+#[test]
+fn a_skipped_place_is_asked_about_and_a_table_answers() {
+    const RESPONSES: usize = 2;
+    let person = who_skips_the_third_place();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let folder = folder.path();
     let length_s = person.now_s;
@@ -576,14 +582,7 @@ fn text_wav_and_universal_files_are_cut_as_npz_with_stated_sensitivities() {
 #[test]
 fn a_marker_names_the_places_and_what_contradicts_it_is_asked() {
     const RESPONSES: usize = 2;
-    let mut person = Person::new(3);
-    // the third place is skipped
-    for place in [0, 1, 3, 4, 5] {
-        for _ in 0..4 {
-            person.good(place);
-        }
-        person.move_on();
-    }
+    let person = who_skips_the_third_place();
     let folder = tempfile::tempdir().expect("a temporary folder");
     let folder = folder.path();
     let mut recorded = signals(&person.strikes, 6, person.now_s, 8);

@@ -1,6 +1,6 @@
 //! A whole campaign for the contact's stiffness, measured live from another program: the simulated
-//! rig's volts over the bridge give the same k_T as `sim:`, although the host is killed in the middle
-//! and scans are lost within a hit.
+//! rig's volts over the bridge give the same k_T as `sim:`, although the host is killed in the
+//! middle and scans are lost within a hit.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
 
@@ -67,7 +67,8 @@ fn play(rig: &Path, way: &[(&str, u32)]) -> Vec<String> {
     all
 }
 
-/// Plays this way to whoever connects, and reports scans as lost in the block after this scan.
+/// Plays the rig to the first program that connects, and reports scans as lost in the block after
+/// this scan.
 fn served(rig: &Path, way: &[(&str, u32)], lose_at: u64) -> (String, std::thread::JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("bridge:tcp:{}", listener.local_addr().unwrap());

@@ -73,14 +73,16 @@ class Lab:
         replace: bool = False,
         dry_run: bool = False,
     ) -> dict[str, Any]:
-        """Finds the hits of one continuous recording and stores them at their places, as `jointrig import --cut` does.
+        """Finds the hits of one continuous recording and stores them at their places.
 
-        channels: as for add_hits, but (sample,). The places: configuration, impact and response name one; order="plan" says
-        that they were struck in the plan's order; marker="CHANNEL:STEP" names a channel whose level is STEP times the place's
-        number in the plan, from 1; table is the text of a CSV table with the columns hit (or time_s), configuration, impact,
-        response. Returns report (what was found, line by line), hits, kept, already and verdicts, a list of (place, hit, verdict,
-        sentence). Raises Refused, with what was found and what to state, where a place is not certain, and stores nothing
-        then; dry_run stores nothing in any case.
+        The rules are those of `jointrig import --cut`. channels: as for add_hits, but (sample,). The
+        places: configuration, impact and response name one; order="plan" says that they were struck
+        in the plan's order; marker="CHANNEL:STEP" names a channel whose level is STEP times the
+        place's number in the plan, from 1; table is the text of a CSV table with the columns hit (or
+        time_s), configuration, impact, response. Returns report (what was found, line by line),
+        hits, kept, already and verdicts, a list of (place, hit, verdict, sentence). Raises Refused,
+        with what was found and what to state, where a place is not certain, and stores nothing then;
+        dry_run stores nothing in any case.
         """
     def add_level(
         self,

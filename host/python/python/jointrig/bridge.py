@@ -79,8 +79,8 @@ class Channel:
 
     unit: N, kN, lbf, m/s, mm/s, m, mm, um, m/s^2, g, V or mV. With sensitivity_v (V per unit; negative for a reversed
     sensor), samples and full_scale are in V, otherwise in the unit. role: hammer_force, response_x, response_y,
-    response_z, specimen_a, specimen_b, load_cell, excitation or auxiliary. delay_s: how late the samples are. bits: those of
-    this channel, if they are not the source's.
+    response_z, specimen_a, specimen_b, load_cell, excitation or auxiliary. delay_s: how late the
+    samples are. bits: those of this channel, if they are not the source's.
     """
 
     name: str
@@ -96,10 +96,12 @@ class Channel:
 class Hammer:
     """A digital output that may fire a hammer, read docs/safety.md first.
 
-    fire(pulse_us) starts one pulse of so many µs, which the device's own hardware times and ends (a counter output), and returns.
-    Never switch an output on and later off instead: a PC may stop in between. release() switches the output off; it is called
-    whenever the hammer is disarmed. Both run in a thread of their own. longest_us: 100 to 8000. shortest_pause_s: from the end of
-    one pulse to the next, 0.6 to 60 s. Write blocks of 10 to 20 ms: without samples for 0.1 s jointrig disarms the hammer.
+    fire(pulse_us) starts one pulse of so many µs, which the device's own hardware times and ends (a
+    counter output), and returns. Never switch an output on and later off instead: a PC may stop in
+    between. release() switches the output off; it is called whenever the hammer is disarmed. Both
+    run in a thread of their own. longest_us: 100 to 8000. shortest_pause_s: from the end of one
+    pulse to the next, 0.6 to 60 s. Write blocks of 10 to 20 ms: without samples for 0.1 s jointrig
+    disarms the hammer.
     """
 
     fire: Callable[[int], object]
@@ -113,25 +115,28 @@ _SILENCE_S = 1.0
 
 
 class _Guard:
-    """Passes jointrig's orders on to a hammer, as far as they are allowed: one pulse for each arming, no longer and no sooner
-    than the hammer allows, none without a line for 1 s, and none that is late."""
+    """Passes jointrig's orders on to a hammer, as far as they are allowed.
+
+    One pulse for each arming, no longer and no sooner than the hammer allows, none without a line
+    for 1 s, and none that is late.
+    """
 
     def __init__(self, hammer: Hammer) -> None:
         self._hammer = hammer
         self._bytes: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._armed, self._spent = False, False
-        self._heard_s, self._free_s, self._sequence = 0.0, float("-inf"), 0
+        self._last_line_s, self._free_s, self._sequence = 0.0, float("-inf"), 0
         self.error: BaseException | None = None
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def hear(self, data: bytes) -> None:
+    def put(self, data: bytes) -> None:
         """Takes bytes from jointrig; none at their end."""
         self._bytes.put(data)
 
     def end(self) -> None:
         """Disarms. The thread may be in fire() for ever if a driver hangs."""
-        self.hear(b"")
+        self.put(b"")
         self._thread.join(2.0)
 
     def _run(self) -> None:
@@ -139,7 +144,7 @@ class _Guard:
         try:
             while not ended:
                 try:
-                    left_s = max(0.0, self._heard_s + _SILENCE_S - time.monotonic())
+                    left_s = max(0.0, self._last_line_s + _SILENCE_S - time.monotonic())
                     parts = [self._bytes.get(timeout=left_s if self._armed else None)]
                 except queue.Empty:
                     self._disarm("jointrig is silent")
@@ -148,15 +153,16 @@ class _Guard:
                 while not self._bytes.empty():
                     parts.append(self._bytes.get())
                 now_s = time.monotonic()
-                stale = self._armed and now_s - self._heard_s > _SILENCE_S
+                stale = self._armed and now_s - self._last_line_s > _SILENCE_S
                 if stale:
                     self._disarm("this program stood still")
-                self._heard_s = now_s
+                self._last_line_s = now_s
                 ended = b"" in parts
                 *lines, rest = (rest + b"".join(parts)).split(b"\n")
                 for place, line in enumerate(lines):
                     self._obey(json.loads(line), late=stale or ended or bool(rest) or place + 1 < len(lines))
-        except BaseException as error:  # the output is released in any case, and the program ends with this error
+        except BaseException as error:
+            # the output is released in any case, and the program ends with this error
             self.error = error
         finally:
             self._armed = False
@@ -236,7 +242,7 @@ class Source:
         self._guard = None if hammer is None else _Guard(hammer)
         # the host keeps standard input open as long as it wants samples
         if os.environ.get(_UNDER_THE_HOST) if self._socket is None else hammer is not None:
-            threading.Thread(target=self._hear, daemon=True).start()
+            threading.Thread(target=self._read_orders, daemon=True).start()
         self._send(json.dumps(header, allow_nan=False).encode() + b"\n")
 
     def __enter__(self) -> Source:
@@ -308,7 +314,7 @@ class Source:
                 raise
             self._gone.set()
 
-    def _hear(self) -> None:
+    def _read_orders(self) -> None:
         data = b"begun"
         while data:
             try:
@@ -316,7 +322,7 @@ class Source:
             except OSError:  # the connection is closed
                 data = b""
             if self._guard is not None:
-                self._guard.hear(data)
+                self._guard.put(data)
         self._gone.set()
 
 
@@ -442,9 +448,10 @@ _OPENING_S = 5.0
 
 
 def from_wav(path: str | os.PathLike[str], channels: Sequence[Channel], *, serial: str | None = None, **source: Any) -> None:
-    """Writes a recording from a WAV file of 16, 24 or 32 bits, from its beginning to its end, as fast as jointrig measures.
+    """Writes a recording from a WAV file of 16, 24 or 32 bits, as fast as jointrig measures.
 
-    The largest code is full_scale. serial: the file's name if absent. For other formats: soundfile and from_callable.
+    The largest code is full_scale. serial: the file's name if absent. For other formats: soundfile
+    and from_callable.
     """
     try:
         file = wave.open(os.fspath(path))

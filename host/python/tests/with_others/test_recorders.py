@@ -101,7 +101,8 @@ def test_a_sound_card_is_a_recorder(tmp_path: Path) -> None:
         run.wait(10)
     got = np.concatenate(blocks)
     assert len(got) == 10 * 2400
-    # PortAudio may begin later than the file, and drop what does not fit its buffer: each block is a part of the file
+    # PortAudio may begin later than the file, and drop what does not fit its buffer: each block is a
+    # part of the file
     for block in blocks[:1] if lost else [got]:
         first = int(np.rint(block[0, 1] / 500 * 1e6))
         np.testing.assert_allclose(block, parts[first : first + len(block)] * np.float32([200, 500]), rtol=1e-6, atol=1e-4)

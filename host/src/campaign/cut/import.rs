@@ -3,7 +3,7 @@
 //! certain. The command and Python differ only in the [`Terms`] of their messages.
 
 use super::marker::{self, Marker};
-use super::places::{Fitted, Named, Unclear};
+use super::places::{Fitted, Named, Unclear, numbers};
 use super::recording::LongRecording;
 use super::{
     CutError, CutHit, Only, Place, assign, contradictions, cut_hit, find_hits, places_of, stated,
@@ -220,21 +220,6 @@ pub fn unused(recording: &LongRecording, marker: Option<&Marker>) -> Option<Stri
             names.join(", ")
         )
     })
-}
-
-/// Numbers of hits, from 1, with ranges.
-fn numbers(hits: &[usize]) -> String {
-    let mut ranges: Vec<[usize; 2]> = Vec::new();
-    for hit in hits {
-        match ranges.last_mut() {
-            Some(last) if last[1] + 1 == *hit => last[1] = *hit,
-            _ => ranges.push([*hit, *hit]),
-        }
-    }
-    let text = |[first, last]: &[usize; 2]| {
-        if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) }
-    };
-    ranges.iter().map(text).collect::<Vec<_>>().join(", ")
 }
 
 /// What was found in the recording, before any fit.

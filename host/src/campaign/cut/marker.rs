@@ -5,8 +5,8 @@
 //! recording: volts, parts of a WAV file's full scale, or SI. A switch, a source or a spare output
 //! of the front end makes it, and it is changed between the hits.
 //!
-//! The level is the median around the hit, so that crosstalk of the pulse does not count. What is
-//! not near a multiple of the step, or changes while the hammer strikes, is no answer but a question.
+//! The level is the median around the hit, so that crosstalk of the pulse does not count. The user
+//! is asked where it is not near a multiple of the step, or changes while the hammer strikes.
 
 use std::str::FromStr;
 

@@ -12,9 +12,9 @@
 //! | all of it, from a recording to the campaign file | [`import`] |
 //!
 //! [`find_hits`] finds and judges the hits; [`assign`] fits them to the plan; [`cut_hit`] returns
-//! the samples of one as a record of the plan's length, which [`campaign::import`](super::import) stores. The
-//! recording is read in pieces: memory is needed for one record at a time, whatever the recording's
-//! length.
+//! the samples of one as a record of the plan's length, which [`campaign::import`](super::import)
+//! stores. The recording is read in pieces: memory is needed for one record at a time, whatever the
+//! recording's length.
 
 pub mod alike;
 pub mod hits;

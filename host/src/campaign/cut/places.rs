@@ -230,8 +230,8 @@ struct Fit<'f> {
     questions: Vec<String>,
 }
 
-/// The numbers of hits as the user sees them: from 1.
-fn numbers(hits: &[usize]) -> String {
+/// Numbers of hits as the user sees them, from 1, with ranges.
+pub fn numbers(hits: &[usize]) -> String {
     let mut ranges: Vec<[usize; 2]> = Vec::new();
     for hit in hits {
         match ranges.last_mut() {
@@ -239,15 +239,15 @@ fn numbers(hits: &[usize]) -> String {
             _ => ranges.push([*hit, *hit]),
         }
     }
-    let text: Vec<String> = ranges
-        .iter()
-        .map(
-            |[first, last]| {
-                if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) }
-            },
-        )
-        .collect();
-    format!("hit{} {}", if hits.len() == 1 { "" } else { "s" }, text.join(", "))
+    let text = |[first, last]: &[usize; 2]| {
+        if first == last { format!("{}", first + 1) } else { format!("{}-{}", first + 1, last + 1) }
+    };
+    ranges.iter().map(text).collect::<Vec<_>>().join(", ")
+}
+
+/// The same after the word "hit" or "hits".
+fn numbered(hits: &[usize]) -> String {
+    format!("hit{} {}", if hits.len() == 1 { "" } else { "s" }, numbers(hits))
 }
 
 impl<'f> Fit<'f> {
@@ -357,7 +357,7 @@ impl<'f> Fit<'f> {
         if !open.is_empty() {
             self.questions.push(format!(
                 "{}: the response is neither that of another place of the recording nor clearly different from all",
-                numbers(&open)
+                numbered(&open)
             ));
         }
     }
@@ -421,7 +421,7 @@ impl<'f> Fit<'f> {
             };
             self.questions.push(format!(
                 "{}: by the responses, the good hits are at {} place{}, and the plan's order has {} here ({})",
-                numbers(&members),
+                numbered(&members),
                 run.len(),
                 if run.len() == 1 { "" } else { "s" },
                 free.len(),
@@ -465,7 +465,7 @@ impl<'f> Fit<'f> {
             doubts.push(format!(
                 "{}: the response changes before hit {}, without a pause, and together they are not more hits than one place should \
                  have: two places with missing hits, or one place where the hammer or a sensor was moved",
-                numbers(&members),
+                numbered(&members),
                 begin + 1
             ));
         }
@@ -486,7 +486,7 @@ impl<'f> Fit<'f> {
             if number == 0 || !apart {
                 doubts.push(format!(
                     "{}: {} of {wanted} good hits: a place with missing hits, or test taps or hits beside the point",
-                    numbers(&group.members),
+                    numbered(&group.members),
                     group.members.len()
                 ));
             }
@@ -540,14 +540,14 @@ impl<'f> Fit<'f> {
             notes.push(format!(
                 "{}: left out, because their response is that of no place with at least {} good hits: test taps, or struck \
                  beside the point",
-                numbers(&good),
+                numbered(&good),
                 self.order.enough()
             ));
         }
         if !refused.is_empty() {
             notes.push(format!(
                 "{}: refused, and left out, because it is not clear at which place they were",
-                numbers(&refused)
+                numbered(&refused)
             ));
         }
         for (number, group) in self.groups.iter().enumerate() {
@@ -559,7 +559,7 @@ impl<'f> Fit<'f> {
                     notes.push(format!(
                         "{} was struck in {visits} visits ({})",
                         self.order.names[place],
-                        numbers(&group.members)
+                        numbered(&group.members)
                     ));
                 }
             }

@@ -32,7 +32,8 @@ use crate::untrusted_text::tell_line;
 
 /// Time between two looks at the folder.
 const LOOK: Duration = Duration::from_millis(200);
-/// A look may take at most this part of the time: listing a large folder on a network share is slow.
+/// The pause between two looks is at least this many times as long as a look: listing a large
+/// folder on a network share is slow.
 const PART: u32 = 5;
 
 /// What changes when a file is written or replaced.

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use serde::Deserialize;
 
 use super::bad;
+use crate::campaign::import::channel_file::ending;
 use crate::campaign::plan::{Cell, Plan, configuration_name};
 use crate::cli::error::CliError;
 use crate::exchange::{delimiter, frf_file, record_uff};
@@ -186,10 +187,6 @@ pub(super) enum Identified {
     LeftOut,
     /// It has a readable format, and neither a cell's name nor labels.
     Unnamed,
-}
-
-fn ending(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Whether a file has the ending of a format that is read.
