@@ -34,6 +34,7 @@ mod report_page;
 mod round_trip;
 mod rows_of_cells;
 mod same_records;
+mod sensor_signs;
 mod shaker;
 mod simulated_truth;
 mod sync;
