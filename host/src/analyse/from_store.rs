@@ -236,6 +236,7 @@ pub struct CampaignFile {
     pub(super) cells: Vec<PlannedCell>,
     pub(super) tally: Tally,
     pub(super) records: HashMap<i64, Vec<Result<RecordRow, Damaged>>>,
+    /// Of each session, with the specimens' vibrometers positive along the sliding direction.
     channels: HashMap<i64, ChannelMap>,
     analysed: AnalysedLength,
     /// Open connections that no thread uses at the moment: an SQLite connection can be passed
@@ -286,7 +287,7 @@ impl CampaignFile {
         }
         let mut channels = HashMap::new();
         for (session, _) in store.sessions()? {
-            channels.insert(session, store.channels(session)?);
+            channels.insert(session, plan.along_sliding(store.channels(session)?));
         }
         Ok(CampaignFile {
             path: store.path().into(),

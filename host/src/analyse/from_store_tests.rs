@@ -110,7 +110,13 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
 /// A campaign in which only AJB was measured: two good hits and a refused one in each of its cells.
 /// There is one session for each of the delays; the cells' hits alternate between them.
 fn campaign(path: &Path, late_ns: &[u32]) -> Store {
-    let mut store = Store::create(path, SMALL, "small.toml").expect("created");
+    campaign_of(path, SMALL, late_ns, 1.0)
+}
+
+/// As [`campaign`], with this plan; the reading of the vibrometer on specimen A is `ldv_a` times
+/// its motion along z.
+fn campaign_of(path: &Path, plan: &str, late_ns: &[u32], ldv_a: f32) -> Store {
+    let mut store = Store::create(path, plan, "small.toml").expect("created");
     let info = SessionInfo {
         address: "sim:".into(),
         board: "virtual".into(),
@@ -139,13 +145,35 @@ fn campaign(path: &Path, late_ns: &[u32]) -> Store {
                 session: *session,
                 utc: utc_now(),
                 utc_error_s: None,
-                recording: recording(map, peak),
+                recording: recording(&read_by(map, ldv_a), peak),
                 verdict,
             };
             store.insert(&record, &Counters::new()).expect("stored");
         }
     }
     store
+}
+
+/// The channels as they would have to be to read the motion along z.
+fn read_by(map: &ChannelMap, ldv_a: f32) -> ChannelMap {
+    let mut map = map.clone();
+    let own = map.channels.iter_mut().filter(|channel| channel.role == Role::SpecimenA);
+    own.for_each(|channel| channel.units_per_volt *= ldv_a);
+    map
+}
+
+#[test]
+fn a_vibrometer_that_looks_the_other_way_changes_nothing_if_the_plan_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let ldv_a = "{ name = \"LDV_A\", position_m = [0.0006, 0.0005, 0.0], direction = [0, 0, 1] }";
+    assert!(SMALL.contains(ldv_a));
+    let plan = SMALL.replace(ldv_a, &ldv_a.replace("[0, 0, 1]", "[0, 0, -1]"));
+    let found = |store: &Store| analyse(store, Wanted::default(), &|_| {}).expect("readable").contact;
+    let usual = found(&campaign(&path("usual.jrig"), &[LATE_NS]));
+    assert!(usual.as_ref().expect("looked for").impacts.is_some());
+    assert!(found(&campaign_of(&path("said.jrig"), &plan, &[LATE_NS], -1.0)) == usual, "to the last bit");
+    assert!(found(&campaign_of(&path("unsaid.jrig"), SMALL, &[LATE_NS], -1.0)) != usual);
 }
 
 #[test]

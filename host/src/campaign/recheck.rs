@@ -233,8 +233,8 @@ impl<'s> Past<'s> {
         }
     }
 
-    /// The amplitude of a level for each possible calibration of its session; `None` if no
-    /// amplitude was controlled.
+    /// The amplitude of a level for each possible calibration of its session and each plan, which
+    /// states where the vibrometers look; `None` if no amplitude was controlled.
     fn amplitudes(&self, level: &LevelRow) -> Result<Option<Vec<f64>>, StoreError> {
         if level.end_hz.is_some() || level.held == Held::Drive || !level.whole() {
             return Ok(None);
@@ -245,7 +245,16 @@ impl<'s> Past<'s> {
             let what = format!("level {} has more or fewer channels than its session", level.id);
             return Err(self.store.content(what));
         }
+        let mut along: Vec<ChannelMap> = Vec::new();
+        for map in maps {
+            for (_, plan) in &self.plans {
+                let map = plan.along_sliding(map.clone());
+                if !along.contains(&map) {
+                    along.push(map);
+                }
+            }
+        }
         let measured = |map: &ChannelMap| Meter::new(map, level.held, level.frequency_hz).amplitude(&samples);
-        Ok(Some(maps.iter().map(measured).collect()))
+        Ok(Some(along.iter().map(measured).collect()))
     }
 }

@@ -122,7 +122,7 @@ pub fn polarity(store: &Store) -> Result<Vec<Polarity>, StoreError> {
     let plan = store.plan()?;
     let rows = kept(store, |_| true)?;
     let Some(last) = rows.last() else { return Ok(Vec::new()) };
-    let map = store.channels(last.session)?;
+    let map = plan.along_sliding(store.channels(last.session)?);
     let loads = load_signs(store, &plan, &rows, &map)?;
     let mut found = Vec::new();
     for (place, channel) in map.channels.iter().enumerate() {
@@ -342,7 +342,7 @@ fn hit(store: &Store, plan: &Plan, row: &RecordRow) -> Result<Option<CheckedHit>
         }
         Err(error) => return Err(error),
     };
-    let map = store.channels(row.session)?;
+    let map = plan.along_sliding(store.channels(row.session)?);
     let mut signals: Vec<Vec<f64>> =
         (0..map.len()).map(|place| map.to_si(place, samples.channel(place))).collect();
     let Some(force) = map.place(Role::HammerForce) else { return Ok(None) };

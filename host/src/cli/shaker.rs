@@ -276,9 +276,10 @@ fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
         return None;
     }
     let read = || {
-        let channels = store.channels(row.session).map_err(|error| error.to_string())?;
-        let samples = store.level_samples(row).map_err(|error| error.to_string())?;
         let plan = store.plan().map_err(|error| error.to_string())?;
+        let channels = store.channels(row.session).map_err(|error| error.to_string())?;
+        let channels = plan.along_sliding(channels);
+        let samples = store.level_samples(row).map_err(|error| error.to_string())?;
         let record = shaking::record(&channels, &plan.load_cells(&channels), &samples, &row.level())
             .map_err(|error| error.to_string())?;
         analyse(&record).map_err(|error| error.to_string())

@@ -1,4 +1,5 @@
-//! A load cell that is mounted in the opposite direction, and a plan that states it.
+//! A load cell that is mounted in the opposite direction, a vibrometer that looks in the opposite
+//! direction, and a plan that states it.
 #![allow(clippy::unwrap_used)]
 
 use jointrig_tests::campaign::short_contact_plan;
@@ -9,11 +10,18 @@ use std::path::Path;
 
 const LC3: &str = "{ name = \"LC3\", position_m = [0.0, -0.065, -0.15], direction = [0, 0, 1] }";
 
+const LDV_A: &str = "{ name = \"LDV_A\", position_m = [0.0006, 0.0005, 0.0], direction = [0, 0, 1] }";
+
 /// Forty-two hits of one second, with the third cell measuring along `direction`.
 fn plan(direction: &str) -> String {
+    with_direction(LC3, direction)
+}
+
+/// Forty-two hits of one second, with this sensor measuring along `direction`.
+fn with_direction(sensor: &str, direction: &str) -> String {
     let text = short_contact_plan();
-    assert!(text.contains(LC3));
-    text.replace(LC3, &LC3.replace("[0, 0, 1]", direction))
+    assert!(text.contains(sensor));
+    text.replace(sensor, &sensor.replace("[0, 0, 1]", direction))
 }
 
 /// Results on a rig with this plan, and the report of the channels' signs.
@@ -72,4 +80,19 @@ fn a_cell_that_is_mounted_the_other_way_round_changes_nothing_if_the_plan_says_s
     let about = |text: &str| text.lines().find(|line| line.contains("lc_3")).unwrap_or_default().to_owned();
     assert!(about(&signs).contains("right"), "{signs}");
     assert!(about(&complaint).contains("TURNED"), "{complaint}");
+}
+
+#[test]
+fn a_vibrometer_that_looks_the_other_way_changes_nothing_if_the_plan_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let turned = "[errors.volts]\nldv_a = -1.0\n";
+    let (usual, _) = found(&folder.path().join("usual"), "", &with_direction(LDV_A, "[0, 0, 1]"));
+    let (said, signs) = found(&folder.path().join("said"), turned, &with_direction(LDV_A, "[0, 0, -1]"));
+    // the sign of the sensor's noise does not change with it
+    let k = k_t(&usual).unwrap();
+    assert!((k_t(&said).unwrap() / k - 1.0).abs() < 0.003, "{:?} and {k}", k_t(&said));
+    // as for the load cell; the device controls the displacement between the specimens, which would
+    // be a sum with the wrong sign
+    assert!((slope(&said) / slope(&usual) - 1.0).abs() < 5e-3, "{} and {}", slope(&said), slope(&usual));
+    assert!(signs.lines().any(|line| line.starts_with("ldv_a") && line.contains("right")), "{signs}");
 }

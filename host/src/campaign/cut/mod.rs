@@ -471,7 +471,8 @@ fn level_of(recording: &LongRecording, plan: &Plan, part: &SteadyPart) -> Result
     let longest = (LONGEST_LEVEL_S * map.fs_hz()) as u64;
     let scans = part.scans.start..part.scans.end.min(part.scans.start + longest);
     let samples = cut_level(recording, scans.clone())?;
-    let reached_m = Meter::new(map, Held::Displacement, part.frequency_hz).amplitude(&samples);
+    let along = plan.along_sliding(map.clone());
+    let reached_m = Meter::new(&along, Held::Displacement, part.frequency_hz).amplitude(&samples);
     let seconds = (scans.end - scans.start) as f64 / map.fs_hz();
     let mut measured = Level {
         frequency_hz: part.frequency_hz,

@@ -345,7 +345,8 @@ pub fn add_level(
         return Err(wrong("frequency and amplitude must be over 0".into()));
     }
     check_samples(channels, &new.samples).map_err(|what| wrong(format!("record{what}")))?;
-    shaking::record(channels, &plan.load_cells(channels), &new.samples, &level).map_err(|what| {
+    let along = plan.along_sliding(channels.clone());
+    shaking::record(&along, &plan.load_cells(&along), &new.samples, &level).map_err(|what| {
         wrong(format!(
             "{what}: a level needs the velocities of both specimens and the load cells; name their channels as the plan does"
         ))
@@ -359,7 +360,7 @@ pub fn add_level(
     }
     let metered = level.end_hz.is_none() && level.held != Held::Drive;
     let reached = if metered {
-        Meter::new(channels, level.held, level.frequency_hz).amplitude(&new.samples)
+        Meter::new(&along, level.held, level.frequency_hz).amplitude(&new.samples)
     } else {
         level.amplitude
     };

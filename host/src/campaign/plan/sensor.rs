@@ -90,6 +90,11 @@ pub(super) fn check_sensors(channels: &[Spanned<SensorPlan>], faults: &mut Fault
 /// A load cell is left out if the cosine between its direction and the sliding direction is below
 /// this.
 const FEELS: f64 = 1e-3;
+/// A vibrometer on a specimen must look along the sliding direction, or against it, to within this
+/// angle, degrees: its reading is taken for the motion along it, and the cosine of 5° is 0.996.
+const OBLIQUE_DEG: f64 = 5.0;
+/// The plan's names of the vibrometers on the specimens.
+const SPOTS: [(Role, &str); 2] = [(Role::SpecimenA, "LDV_A"), (Role::SpecimenB, "LDV_B")];
 
 impl Plan {
     /// The load cells that measure along the sliding direction: index in the map, and the factor of
@@ -101,6 +106,19 @@ impl Plan {
             .map(|place| (place, self.sliding_part(&map.channels[place].name)))
             .filter(|(_, part)| part.abs() > FEELS)
             .collect()
+    }
+
+    /// The same channels with the vibrometers on the specimens positive along the sliding direction:
+    /// the scale of one that the plan's sensor `LDV_A` or `LDV_B` says looks against it has the
+    /// opposite sign.
+    pub fn along_sliding(&self, mut map: ChannelMap) -> ChannelMap {
+        for channel in &mut map.channels {
+            let spot = SPOTS.into_iter().find(|(role, _)| *role == channel.role);
+            if spot.is_some_and(|(_, name)| self.sliding_part(name) < 0.0) {
+                channel.units_per_volt = -channel.units_per_volt;
+            }
+        }
+        map
     }
 
     /// Cosine between the measurement direction of this channel's sensor and the sliding direction;
@@ -295,6 +313,16 @@ impl Plan {
                 at,
                 format!("geometry: direction of `{}` must have length 1", sensor.name),
             );
+            let is_spot = SPOTS.iter().any(|(_, name)| letters(name).eq(letters(&sensor.name)));
+            faults.unless(
+                !is_spot || self.sliding_part(&sensor.name).abs() >= OBLIQUE_DEG.to_radians().cos(),
+                at,
+                format!(
+                    "geometry: direction of `{}` must be the sliding direction or its opposite, to within \
+                     {OBLIQUE_DEG}°: its reading is taken for the motion along it",
+                    sensor.name
+                ),
+            );
         }
         for point in &geometry.response {
             let (point, at) = (point.get_ref(), point.span().start);
@@ -450,5 +478,30 @@ mod tests {
         assert!((inclined.load_cells(&map())[0].1 - 0.8).abs() < 1e-12);
         let across = plan(lc1, &lc1.replace("[0, 0, 1]", "[0, 1, 0]"));
         assert_eq!(across.load_cells(&map()).iter().map(|cell| cell.0).collect::<Vec<_>>(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn a_vibrometer_that_looks_against_the_sliding_direction_is_turned() {
+        let ldv_a = "{ name = \"LDV_A\", position_m = [0.0006, 0.0005, 0.0], direction = [0, 0, 1] }";
+        assert!(CONTACT.contains(ldv_a));
+        let plan = |direction: &str| {
+            let text = CONTACT.replace(ldv_a, &ldv_a.replace("[0, 0, 1]", direction));
+            Plan::parse_new(&text, "plan.toml").map_err(|error| error.to_string())
+        };
+        let mut channels = map();
+        channels.channels[0].role = Role::SpecimenA;
+        channels.channels[1].role = Role::SpecimenB;
+        let scales = |direction: &str| {
+            let turned = plan(direction).expect("a plan").along_sliding(channels.clone());
+            turned.channels.iter().map(|channel| channel.units_per_volt).collect::<Vec<_>>()
+        };
+        assert_eq!(scales("[0, 0, 1]"), [1.0; 4]);
+        assert_eq!(scales("[0, 0, -1]"), [-1.0, 1.0, 1.0, 1.0]);
+        // 3° and 8°
+        assert_eq!(scales("[0, 0.0523, -0.9986]"), [-1.0, 1.0, 1.0, 1.0]);
+        for oblique in ["[0, 0.1392, -0.9903]", "[1, 0, 0]"] {
+            let said = plan(oblique).expect_err("too oblique");
+            assert!(said.contains("direction of `LDV_A` must be the sliding direction"), "{said}");
+        }
     }
 }

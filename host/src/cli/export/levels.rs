@@ -104,9 +104,9 @@ pub(super) fn table(
 
 /// The velocities and the force of a level, aligned in time.
 pub(super) fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
-    let channels = store.channels(row.session)?;
-    let samples = store.level_samples(row)?;
     let plan = store.plan()?;
+    let channels = plan.along_sliding(store.channels(row.session)?);
+    let samples = store.level_samples(row)?;
     let normal_load_n = plan.contact.as_ref().and_then(|contact| contact.get_ref().normal_load_n);
     let record = shaking::record(&channels, &plan.load_cells(&channels), &samples, &row.level())
         .map_err(|what| CliError::Bad(format!("the shaker's level {} ({}): {what}", row.id, row.level())))?;

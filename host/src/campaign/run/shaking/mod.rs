@@ -107,7 +107,7 @@ pub fn run_watched(
     let address = session.address().to_owned();
     let unfit = |what| ShakeError::Unfit { address: address.clone(), what };
     let (planned, remarks) = with_sensors(&plan, &device).map_err(unfit)?;
-    let channels = store.calibrated(store.next_session()?, planned.clone())?;
+    let channels = plan.along_sliding(store.calibrated(store.next_session()?, planned.clone())?);
     error::check_fit(&address, &info, &channels, options)?;
     let accepted = options.new_structure;
     let changed =
@@ -441,7 +441,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Creates a meter for these channels; with an open-loop drive, it measures the specimens'
+    /// Creates a meter for these channels ([`Plan::along_sliding`]); with an open-loop drive, it measures the specimens'
     /// relative displacement to determine whether the structure has settled.
     pub fn new(channels: &ChannelMap, held: Held, frequency_hz: f64) -> Self {
         let omega = TAU * frequency_hz;
@@ -501,8 +501,8 @@ impl Meter {
 #[error("its session has no {0}")]
 pub struct Unusable(&'static str);
 
-/// v_A, v_B and the load cells' sum, aligned in time; `cells` are
-/// [`Plan::load_cells`](crate::campaign::plan::Plan::load_cells).
+/// v_A, v_B and the load cells' sum, aligned in time; `channels` are those of [`Plan::along_sliding`],
+/// and `cells` [`Plan::load_cells`].
 ///
 /// # Errors
 /// A channel is missing.
