@@ -37,6 +37,7 @@ mod same_records;
 mod sensor_signs;
 mod shaker;
 mod simulated_truth;
+mod softer_hits;
 mod sync;
 mod troubleshooting;
 mod tutorial;

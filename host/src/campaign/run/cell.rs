@@ -66,7 +66,7 @@ impl Runner<'_> {
             }
             let known = again.front().map(|known| (known.id, known.crc, known.shot.pulse_us));
             let pulse_us = known.map_or_else(
-                || self.forces.pulse_us(self.tally.kept_in(row.id)),
+                || self.forces.pulse_us(self.tally.kept_in(row.id) + self.cells_before(row)),
                 |(_, _, pulse_us)| pulse_us,
             );
             self.mark()?;
@@ -305,6 +305,19 @@ impl Runner<'_> {
             cell.impact,
             cell.response,
         )
+    }
+
+    /// The number of cells with the same impact that are struck before this one. Every second of
+    /// them begins with the softer force, because a hit acts on what is left of the last one's
+    /// motion: if the softer hit were always the second, that would look as if the response changed
+    /// with the force.
+    fn cells_before(&self, row: &CellRow) -> u32 {
+        let same = |other: &&CellRow| {
+            other.cell.configuration == row.cell.configuration
+                && other.cell.impact == row.cell.impact
+                && self.plan.own_channels(&other.cell.response).is_none()
+        };
+        self.cells.iter().take_while(|other| other.id != row.id).filter(same).count() as u32
     }
 
     /// A cell's progress.

@@ -525,9 +525,9 @@ impl Forces {
         Self(loops)
     }
 
-    /// The pulse for the next shot in a cell with `kept` good hits, µs.
-    pub fn pulse_us(&self, kept: u32) -> u32 {
-        self.0[kept as usize % self.0.len()].pulse_us()
+    /// The pulse of the shot with this number, µs: every second one is softer.
+    pub fn pulse_us(&self, number: u32) -> u32 {
+        self.0[number as usize % self.0.len()].pulse_us()
     }
 
     /// Updates the loop after a hit was judged. A record with missing samples is ignored: its peak
