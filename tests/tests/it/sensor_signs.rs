@@ -66,7 +66,7 @@ fn recording(rig: &mut Rig, map: &ChannelMap) -> Recording {
     while trigger.is_none_or(|trigger| scans.len() < trigger + SCANS - BEFORE) {
         let mut codes = vec![0; rig.channels().len()];
         rig.scan(&mut codes);
-        let force_n = f64::from(codes[0]) * f64::from(map.channels[0].units_per_code());
+        let force_n = f64::from(codes[0]) * map.channels[0].units_per_code();
         if trigger.is_none() && force_n > TRIGGER_N {
             trigger = Some(scans.len());
         }

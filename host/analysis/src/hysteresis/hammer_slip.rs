@@ -38,9 +38,10 @@ const NO_ACCIDENT: f64 = 1e-3;
 
 /// A change of T per newton below this does not count as slip: the hammer strikes when some 0.3 %
 /// of the last hit's motion is left, most of it in the mode that rings longest. The runner strikes
-/// the softer of two forces first in every second cell of an impact, so that this does not follow
-/// the force. Where the softer hit always comes second, as in records of other programs, it does: on
-/// simulated rigs without slip by up to 0.6 %, and by 1.4 % with a fifth of the damping.
+/// the softer of two forces first in every second cell of an impact, so that a third of the change
+/// that this makes follows the force. Where the softer hit always comes second, as in records of
+/// other programs, all of it does: on simulated rigs without slip up to 0.6 %, and 1.4 % with a fifth
+/// of the damping.
 const LEFT_BEHIND: f64 = 0.015;
 
 /// Standard deviations above which a single change is not scatter.
