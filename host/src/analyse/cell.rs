@@ -3,7 +3,7 @@
 
 use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;
-use crate::contact::ContactPriors;
+use crate::contact::{ContactPriors, Specimen};
 use crate::hysteresis::HysteresisRecord;
 use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
@@ -166,6 +166,11 @@ pub trait Measurements: Sync {
     /// stated.
     fn spots_m(&self) -> Option<[[f64; 3]; 2]> {
         None
+    }
+
+    /// What is stated of the bulk of specimens A and B.
+    fn specimens(&self) -> [Option<Specimen>; 2] {
+        [None; 2]
     }
 
     /// Prior knowledge of positions, angles, gains and delays.

@@ -84,6 +84,7 @@ pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>)
         cells,
         contact_m: measurements.geometry().virtual_point_b_m,
         spots_m: measurements.spots_m(),
+        specimens: measurements.specimens(),
         priors: measurements.contact_priors(),
         band_hz: BAND,
     }

@@ -22,7 +22,7 @@ use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::{Rows, places as response_places};
 use crate::campaign::store::session_table::SessionInfo;
-use crate::contact::ContactPriors;
+use crate::contact::{ContactPriors, Specimen};
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::results;
@@ -471,6 +471,10 @@ impl Measurements for CampaignFile {
                 .map(|s| s.position_m)
         };
         Some([at("LDV_A")?, at("LDV_B")?])
+    }
+
+    fn specimens(&self) -> [Option<Specimen>; 2] {
+        self.plan.known_specimens()
     }
 
     fn contact_priors(&self) -> ContactPriors {

@@ -8,7 +8,7 @@
 //! time, so that several cells have the same hits: the signals that all cells contain (T and the
 //! spots) count in the first of them only.
 
-use super::parameters::{Cause, DELAYS, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
+use super::parameters::{Cause, DELAYS, ELASTIC, FORM, GAINS, Parameter, Parameters, SPOTS, along_z};
 use super::{ContactError, ContactPriors, Input};
 use crate::band::Band;
 use crate::frf::MotionQuantity;
@@ -297,7 +297,8 @@ fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
             found[place].cells.push((group, cell));
         }
     }
-    let specimen_b = found.iter().any(|i| i.cells.iter().any(|(group, _)| *group == Group::SpecimenB));
+    let of_b = |impact: &Impact<'_>| impact.cells.iter().any(|(group, _)| *group == Group::SpecimenB);
+    let specimen_b = found.iter().any(of_b);
     found.retain(|impact| {
         let known = |of: Group| {
             let own = impact.cells.iter().filter(|(group, _)| *group == of);
@@ -308,7 +309,8 @@ fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
         };
         known(Group::ArmB)
             && (impact.structure == Structure::B || known(Group::SpecimenA))
-            && (!specimen_b || known(Group::SpecimenB))
+            // on B alone its specimen carries no force and moves with the arm
+            && (!specimen_b || known(Group::SpecimenB) || (impact.structure == Structure::B && !of_b(impact)))
     });
     found
 }
@@ -340,7 +342,7 @@ fn block(
 ) -> Result<Block, ContactError> {
     let priors = &input.priors;
     let alone = impact.structure == Structure::B;
-    let mut own: Vec<usize> = if alone { (FORM..SPOTS).collect() } else { (0..SPOTS).collect() };
+    let mut own: Vec<usize> = if alone { (FORM..ELASTIC).collect() } else { (0..SPOTS).collect() };
     own.extend(SPOTS..SPOTS + 4);
     own.extend(GAINS..GAINS + 5);
     own.extend(DELAYS..DELAYS + 5);
@@ -348,6 +350,14 @@ fn block(
         .then(|| parameters.add([along_z(impact.name, impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
+    let on_b = |impact: &Impact<'_>| impact.cells.iter().any(|(group, _)| *group == Group::SpecimenB);
+    // the spot on B belongs to specimen B: without its points here, arm B's do not give the spot's
+    // motion
+    let spots = match alone {
+        true if impacts.iter().any(on_b) && !on_b(impact) => 0..0,
+        true => 1..2,
+        false => 1..3,
+    };
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<CellValues>::new());
     for (place, (group, cell)) in impact.cells.iter().enumerate() {
         let MeasuredPoint { position: point, axes } = points[&(*group, cell.point)].clone();
@@ -373,7 +383,7 @@ fn block(
         };
         own.extend(aimed.into_iter().flat_map(|at| at..at + 3));
         own.extend(shift.into_iter().flat_map(|at| at..at + 2));
-        let spots = if cell.has_spots() && first.is_none() { 1..if alone { 2 } else { 3 } } else { 0..0 };
+        let spots = if cell.has_spots() && first.is_none() { spots.clone() } else { 0..0 };
         let of_all = (first.is_none()).then_some(0).into_iter().chain(spots);
         let channels = of_all.chain(POINT..POINT + axes.len());
         rows.extend(channels.map(|channel| ChannelRow { cell: place, channel }));

@@ -136,6 +136,11 @@ impl<'a> Driven<'a> {
         Some(Driven { blocks, parts, lines, motion, weights, higher, shared: shared(step_hz), per_t })
     }
 
+    /// Whether specimen B has points of its own.
+    pub fn specimen_b(&self) -> bool {
+        self.blocks[self.parts[0].block].specimen_b().is_some()
+    }
+
     /// The uncertainty of Σ g_k motion_k.
     pub fn known(&self, g: &[C; MOTIONS]) -> Known {
         let coordinates = places(&self.blocks[self.parts[0].block]);

@@ -134,7 +134,14 @@ fn input<'a>(cells: &'a [Cell], keep: impl Fn(&Cell) -> bool) -> Input<'a> {
         quantity: MotionQuantity::Acceleration,
     };
     let cells = cells.iter().filter(|cell| keep(cell)).map(one).collect();
-    Input { cells, contact_m: [0.0; 3], spots_m: None, priors, band_hz: BAND }
+    Input {
+        cells,
+        contact_m: [0.0; 3],
+        spots_m: None,
+        specimens: [Some(Specimen::RIGID); 2],
+        priors,
+        band_hz: BAND,
+    }
 }
 
 #[test]

@@ -16,8 +16,11 @@
 
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
+use super::elastic::Shape;
 use super::outcome::{Interval, Variances, stiffness_of};
-use super::parameters::{COMPLIANCE, Cause, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS};
+use super::parameters::{
+    COMPLIANCE, Cause, DELAYS, ELASTIC, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B,
+};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N, Stiffness};
 use crate::C;
 use crate::band::Band;
@@ -128,7 +131,7 @@ pub fn level_stiffness(
     let Some(spots) = light.spots_from_contact() else {
         return levels.iter().map(|_| Err(ContactError::NoSpots.into())).collect();
     };
-    let mut parameters = Parameters::new(&light.priors, START_M_PER_N, spots);
+    let mut parameters = Parameters::new(&light.priors, START_M_PER_N, spots, light.elastic_priors());
     let blocks = match blocks(&Input { band_hz: LEVEL_LINES, ..light.clone() }, &mut parameters) {
         Ok(blocks) if parameters.all().len() == known.p.len() => blocks,
         Ok(_) => return levels.iter().map(|_| Err(LevelError::NoLines)).collect(),
@@ -319,7 +322,8 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Le
     let p = &known.p;
     let tones = mean_of(&level.stretches);
     let u = driven.per_t;
-    let compliance = contact(p, s, &u, tones);
+    let own_b = driven.specimen_b();
+    let compliance = contact(p, s, &u, tones, own_b);
     // a body moves by about 1/K of the load cells per newton, so that a fraction of the largest
     // motion is a suitable step for every motion
     let largest = u.iter().map(|u| u.norm()).fold(0.0, f64::max);
@@ -328,7 +332,7 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Le
         let moved = |by: f64| {
             let mut moved = u;
             moved[k] += by;
-            contact(p, s, &moved, tones)
+            contact(p, s, &moved, tones, own_b)
         };
         (moved(step) - moved(-step)) / (2.0 * step)
     });
@@ -341,7 +345,7 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Le
             let moved = |by: f64| {
                 let mut moved = p.clone();
                 moved[i] += by;
-                contact(&moved, s, &u, tones)
+                contact(&moved, s, &u, tones, own_b)
             };
             by_parameter[i] = (moved(step) - moved(-step)) / (2.0 * step);
         }
@@ -354,16 +358,25 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Le
         by_parameter,
         turning: turning.noise + turning.bend,
         place: turning.place?,
-        stretches: level.stretches.iter().map(|own| contact(p, s, &u, *own)).collect(),
+        stretches: level.stretches.iter().map(|own| contact(p, s, &u, *own, own_b)).collect(),
     })
 }
 
-/// Δx/F at the contact from a level's T, x_A and x_B, with the motions `u` per newton of T.
-fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3]) -> C {
+/// Δx/F at the contact from a level's T, x_A and x_B, with the motions `u` per newton of T; `own_b`
+/// states whether specimen B has points of its own.
+fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3], own_b: bool) -> C {
     let displacement =
         |channel: usize, seen: C| seen / ((1.0 + p[GAINS + channel]) * (-s * p[DELAYS + channel]).exp());
     // (θ × r) along z is θ_x y − θ_y x
     let tilt = |spot: usize, turn: [C; 2]| t * (turn[0] * p[SPOTS + spot + 1] - turn[1] * p[SPOTS + spot]);
+    let bulk = |shape: Shape, spot: usize| shape.at([0.0, p[SPOTS + spot], 0.0]).value[(2, 2)];
+    // per newton of F: the spot's displacement beyond the body's, and that of B's surface
+    let bulk_a = bulk(Shape::of_a(&p[ELASTIC..]), 1);
+    let (bulk_b, tip) = if own_b {
+        (bulk(Shape::of_b(&p[ELASTIC..]), 3), 0.0)
+    } else {
+        (p[TIP_B] * (1.0 + p[TIP_B + 1] * p[SPOTS + 3]), p[TIP_B])
+    };
     let z_a = displacement(0, a) - tilt(0, [u[6], u[7]]);
     let z_b = displacement(1, b) - tilt(2, [u[4], u[5]]);
     let z_arm = z_b + t * (u[0] - u[3]);
@@ -374,7 +387,9 @@ fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3]) -> C {
         + s * s
             * (p[INERTIA_B] * (z_b - z_arm)
                 + t * (p[INERTIA_B + 1] * (u[4] - u[1]) - p[INERTIA_B + 2] * (u[5] - u[2])));
-    (z_a - z_b) / force
+    // z_arm of the form is without what F itself bends
+    let force = force / (1.0 + form(2) * bulk_b);
+    (z_a - z_b) / force - bulk_a + bulk_b - tip
 }
 
 /// A level's compliance, its dependence on the parameters of the hits' fit, and its other

@@ -161,7 +161,14 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
             quantity: MotionQuantity::Velocity,
         }
     });
-    Input { cells: cells.collect(), contact_m: [0.0; 3], spots_m: Some(SPOTS), priors, band_hz: BAND }
+    Input {
+        cells: cells.collect(),
+        contact_m: [0.0; 3],
+        spots_m: Some(SPOTS),
+        specimens: [Some(Specimen::RIGID); 2],
+        priors,
+        band_hz: BAND,
+    }
 }
 
 /// Twenty newtons at the mass, at the stated position of its hit.

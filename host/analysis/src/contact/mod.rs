@@ -9,9 +9,11 @@
 //!    form of T and of arm B's motion at the contact (z_B, θ_x, θ_y), with terms in 1, s and s²,
 //!    which covers any mass, rod and load-cell gain. In the assembly the same form gives the
 //!    contact's force.
-//! 2. **Rotation.** Points on specimen A show its motion as a rigid body; arm B's points show that
-//!    of B. The points are those of a 3-D vibrometer, or fixed sensors (accelerometers) with known
-//!    positions and axes; then spots next to the contact are not needed.
+//! 2. **Rotation.** Points on the specimens show their motion, or arm B's points that of B. Each
+//!    specimen also bends and shears under the contact's force (`elastic`): k_T is the stiffness
+//!    between the two surfaces, and the bulk between them and the sensors is fitted, not counted as
+//!    contact. The points are those of a 3-D vibrometer, or fixed sensors (accelerometers) with
+//!    known positions and axes; then spots next to the contact are not needed.
 //! 3. **One fit.** z_A − z_B = F/(k_T + s c_T) at the contact, for all lines, impacts and cells
 //!    together. The motion of the bodies is eliminated at every line (`model`), so that noise in
 //!    the signals that the force is formed from does not pull k_T down. Spots, points, gains,
@@ -22,6 +24,7 @@
 //!
 //! - `block`: the measured signals of each cell, and the cells of an impact
 //! - `parameters`: the unknowns
+//! - `elastic`: how a specimen bends under the contact's force
 //! - `model`: the signals of a line as a linear map of the motion, and its elimination
 //! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell
 //!   beyond its noise
@@ -34,6 +37,7 @@ use std::f64::consts::TAU;
 
 mod block;
 mod driven;
+mod elastic;
 #[cfg(test)]
 mod fixed_tests;
 mod levels;
@@ -47,6 +51,7 @@ mod solver;
 mod tests;
 
 pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
+pub use elastic::Specimen;
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
 };
@@ -58,7 +63,7 @@ use crate::substructuring::geometry::Grouping;
 use block::{Block, Group, POINT, blocks};
 use nalgebra::DVector;
 use outcome::{Variances, of_sum, trusted};
-use parameters::{FORM, Parameters};
+use parameters::{FORM, Parameters, TIP_B};
 use solver::Certainty;
 use solver::Solution;
 
@@ -84,6 +89,8 @@ pub struct Input<'a> {
     /// Positions of the vibrometer spots next to the contact, on A and on B, m; none if only the
     /// points measure the specimens.
     pub spots_m: Option<[[f64; 3]; 2]>,
+    /// What the plan states of the bulk of specimens A and B; `None` if nothing.
+    pub specimens: [Option<Specimen>; 2],
     /// Prior knowledge.
     pub priors: ContactPriors,
     /// The band of the lines used.
@@ -91,6 +98,22 @@ pub struct Input<'a> {
 }
 
 impl Input<'_> {
+    /// Priors of the specimens' shapes.
+    fn elastic_priors(&self) -> [[f64; 2]; 2 * elastic::TERMS] {
+        let on_specimen = |cell: &&ContactCell<'_>| {
+            matches!(cell.point_grouping, Grouping::SpecimenA | Grouping::SpecimenB)
+        };
+        let height = |cell: &ContactCell<'_>| (cell.point_m[1] - self.contact_m[1]).abs();
+        let heights = self.cells.iter().filter(on_specimen).map(height);
+        elastic::priors(self.specimens, heights.fold(0.0, f64::max))
+    }
+
+    /// Whether nothing measures specimen B itself: then its bulk and its clamp are part of k_T.
+    fn includes_specimen_b(&self) -> bool {
+        let on_b = self.cells.iter().any(|cell| cell.point_grouping == Grouping::SpecimenB);
+        !on_b && !self.cells.iter().any(ContactCell::has_spots)
+    }
+
     /// Positions of the spots relative to the contact, m.
     fn spots_from_contact(&self) -> Option<[[f64; 3]; 2]> {
         let relative = |spot: [f64; 3]| std::array::from_fn(|axis| spot[axis] - self.contact_m[axis]);
@@ -223,7 +246,8 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         return Err(ContactError::NoSpots);
     }
     // without spots no signal depends on their positions
-    let mut parameters = Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default());
+    let mut parameters =
+        Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default(), input.elastic_priors());
     let mut blocks = blocks(input, &mut parameters)?;
     if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
         return Err(ContactError::NoForce);
@@ -239,6 +263,10 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         )));
     }
     scale_form(&mut parameters, &blocks);
+    if input.includes_specimen_b() {
+        // no signal separates it from the contact
+        parameters.narrow(TIP_B, 0.0);
+    }
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })

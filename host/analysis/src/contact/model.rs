@@ -3,17 +3,22 @@
 //! parameters.
 //!
 //! The motion is that of rigid bodies: arm B (t, θ), specimen A (t, θ) and, if it has points of its
-//! own, specimen B. The contact couples them: z_A − z_B = F/(k_T + s c_T) at the contact itself,
+//! own, specimen B. Motion of a specimen is that of its surface at the contact; the rest of it
+//! deviates from that by its bending and shear, which are proportional to F (`elastic`). Without
+//! points of its own, specimen B's surface deviates from arm B in proportion to F. The contact
+//! couples the surfaces: z_A − z_B = F/(k_T + s c_T) at the contact itself,
 //! with F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y). So z_A is not an independent
 //! coordinate but follows from T and B's motion; on B alone, where F is the hammer's, T follows
 //! from B's motion.
 
 use super::block::{Axis, Block, BlockCell, BlockLine, ChannelRow, Group, POINT};
+use super::elastic::{Compliance, Shape};
 use super::parameters::{
-    COMPLIANCE, DELAYS, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, RETARDATION, SPOTS,
+    COMPLIANCE, DELAYS, ELASTIC, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, LATERAL, RETARDATION,
+    SPOTS, TIP_B,
 };
 use crate::C;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use num_complex::Complex;
 
 /// Largest number of coordinates of the motion.
@@ -34,7 +39,8 @@ pub struct LineModel<'a> {
     p: &'a [f64],
     s: C,
     z_b: Linear,
-    force: Linear,
+    /// The contact's force on B.
+    force: [Linear; 3],
     z_a: Linear,
     t: Linear,
     t_offset: C,
@@ -57,6 +63,21 @@ fn dot(of: &Linear, x: &DVector<C>) -> C {
     of.iter().zip(x.iter()).map(|(a, b)| a * b).sum()
 }
 
+/// Displacement of a point by the specimen's deformation, per newton of the contact's force.
+struct Bulk {
+    moved: Compliance,
+    /// Its derivatives: (parameter, value).
+    by: Vec<(usize, Compliance)>,
+    /// Its derivatives by the point's coordinates.
+    by_place: [Compliance; 3],
+}
+
+/// Displacement along `direction` by the contact's force.
+fn along(direction: [f64; 3], of: &Compliance, force: &[C; 3]) -> C {
+    let part = |axis: usize| (0..3).map(|row| direction[row] * of[(row, axis)]).sum::<f64>();
+    (0..3).map(|axis| force[axis] * part(axis)).sum()
+}
+
 /// Displacement along `axis` of a point of a body: t + θ × r, with the body's rotation θ.
 fn turned(translation: &Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> Linear {
     let mut moved = *translation;
@@ -71,7 +92,7 @@ impl<'a> LineModel<'a> {
     /// The map with the parameters `p` at s.
     pub fn new(block: &'a Block, p: &'a [f64], s: C) -> Self {
         let z_arm = unit(2);
-        let z_b = block.specimen_b().map_or(z_arm, |at| unit(at + 2));
+        let mut z_b = block.specimen_b().map_or(z_arm, |at| unit(at + 2));
         let coefficient = |n: usize| C::from(p[FORM + n]);
         let a_t = coefficient(0) + coefficient(1) * s;
         let of_motion = |n: usize| coefficient(n) + coefficient(n + 1) * s + coefficient(n + 2) * s * s;
@@ -90,13 +111,22 @@ impl<'a> LineModel<'a> {
         ]);
         let (t, t_offset, force, z_a) = if let Some(along_z) = block.along_z {
             let t = sum(&[(-a_t.inv(), &rest)]);
-            (t, p[along_z] / a_t, [C::default(); MOST], [C::default(); MOST])
+            (t, p[along_z] / a_t, [[C::default(); MOST]; 3], [C::default(); MOST])
         } else {
             let t = unit(T);
-            let force = sum(&[(a_t, &t), (C::new(1.0, 0.0), &rest)]);
+            let one = C::new(1.0, 0.0);
+            let force = sum(&[(a_t, &t), (one, &rest)]);
+            if block.specimen_b().is_none() {
+                z_b = sum(&[(one, &z_b), (C::from(p[TIP_B]), &force)]);
+            }
             let compliance = p[COMPLIANCE] / (1.0 + s * p[RETARDATION]);
-            let z_a = sum(&[(C::new(1.0, 0.0), &z_b), (compliance, &force)]);
-            (t, C::default(), force, z_a)
+            let z_a = sum(&[(one, &z_b), (compliance, &force)]);
+            // the contact as a spring along x and y
+            let [x, y] = [0, 1].map(|axis| {
+                let stiffness = C::from(p[LATERAL + axis].exp());
+                sum(&[(stiffness, &unit(A + axis)), (-stiffness, &unit(b + axis))])
+            });
+            (t, C::default(), [x, y, force], z_a)
         };
         LineModel { block, p, s, z_b, force, z_a, t, t_offset, a_t, hammer: 1.0 }
     }
@@ -181,6 +211,36 @@ impl<'a> LineModel<'a> {
         }
     }
 
+    /// Displacement of a cell's point per newton of the contact's force, beyond that of the surface
+    /// at the contact; none on arm B.
+    fn bulk(&self, cell: &BlockCell) -> Option<Bulk> {
+        (cell.group != Group::ArmB).then(|| self.bulk_at(cell.group == Group::SpecimenA, self.position(cell)))
+    }
+
+    /// The same for a spot. Without points on B, its surface turns relative to arm B.
+    fn bulk_of_spot(&self, of_a: bool) -> Bulk {
+        let (_, _, place) = self.spot(of_a);
+        if of_a || self.block.specimen_b().is_some() {
+            return self.bulk_at(of_a, place);
+        }
+        let (tip, turn) = (self.p[TIP_B], self.p[TIP_B + 1]);
+        let y = place[1];
+        let along_z = |value: f64| Compliance::from_diagonal(&[0.0, 0.0, value].into());
+        Bulk {
+            moved: along_z(tip * turn * y),
+            by: vec![(TIP_B, along_z(turn * y)), (TIP_B + 1, along_z(tip * y))],
+            by_place: [Compliance::zeros(), along_z(tip * turn), Compliance::zeros()],
+        }
+    }
+
+    fn bulk_at(&self, of_a: bool, r: [f64; 3]) -> Bulk {
+        let own = &self.p[ELASTIC..];
+        let shape = if of_a { Shape::of_a(own) } else { Shape::of_b(own) };
+        let at = shape.at(r);
+        let by = shape.by_parameters(&at).into_iter().map(|(n, by)| (ELASTIC + n, by));
+        Bulk { moved: at.value, by: by.collect(), by_place: at.by_place }
+    }
+
     /// The map, with one row for each of the block's rows, and the rows' values without any motion.
     pub fn map(&self) -> (DMatrix<C>, Vec<C>) {
         let rows: Vec<Linear> = self.block.rows.iter().map(|row| self.row(row.cell, row.channel)).collect();
@@ -195,7 +255,9 @@ impl<'a> LineModel<'a> {
             0 => self.t,
             1 | 2 => {
                 let (z, theta, place) = self.spot(channel == 2);
-                sum(&[(self.of_spot(2 - channel), &turned(&z, theta, place, 2))])
+                let factor = self.of_spot(2 - channel);
+                let bulk = factor * self.bulk_of_spot(channel == 2).moved[(2, 2)];
+                sum(&[(factor, &turned(&z, theta, place, 2)), (bulk, &self.force[2])])
             }
             _ => {
                 let cell = &self.block.cells[cell];
@@ -203,8 +265,12 @@ impl<'a> LineModel<'a> {
                 let (moved, _) = self.point(cell);
                 let factor = self.sensor(axis.gain, axis.delay);
                 let parts = self.direction(axis).map(|part| factor * part);
-                let terms: Vec<(C, &Linear)> =
+                let mut terms: Vec<(C, &Linear)> =
                     parts.into_iter().zip(&moved).filter(|(part, _)| *part != C::default()).collect();
+                if let Some(bulk) = self.bulk(cell) {
+                    let per_newton = Vector3::from(self.direction(axis)).transpose() * bulk.moved;
+                    terms.extend(per_newton.iter().map(|part| factor * part).zip(&self.force));
+                }
                 sum(&terms)
             }
         }
@@ -220,17 +286,29 @@ impl<'a> LineModel<'a> {
     ) -> Vec<Sparse> {
         let local = |parameter: usize| self.block.local(parameter);
         let terms = self.form_terms(x);
-        let force = dot(&self.force, x);
+        let forces = [0, 1, 2].map(|axis| dot(&self.force[axis], x));
+        let force = forces[2];
         let damped = 1.0 + self.s * self.p[RETARDATION];
         let compliance = self.p[COMPLIANCE] / damped;
-        // derivatives of z_A at the contact by everything that it depends on
-        let of_z_a = |factor: C, row: &mut Sparse| {
-            row.push((local(COMPLIANCE), factor * force / damped));
-            row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
+        // without points on B, its surface at the contact deviates from arm B
+        let tip = if self.block.specimen_b().is_none() { self.p[TIP_B] } else { 0.0 };
+        // derivatives of a specimen's z at the contact by the contact itself, and of everything
+        // that follows the force by the form, with the factor of F
+        let of_z = |of_a: bool, factor: C, bulk: C, row: &mut Sparse| {
+            let mut of_force = bulk + factor * tip;
+            if of_a {
+                row.push((local(COMPLIANCE), factor * force / damped));
+                row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
+                of_force += factor * compliance;
+            }
+            if self.block.specimen_b().is_none() {
+                row.push((local(TIP_B), factor * force));
+            }
             for (n, term) in terms.iter().enumerate() {
-                row.push((local(FORM + n), factor * compliance * term));
+                row.push((local(FORM + n), of_force * term));
             }
         };
+        let assembled = self.block.along_z.is_none();
         let mut all = Vec::with_capacity(self.block.rows.len());
         for (r, row) in self.block.rows.iter().enumerate() {
             let mut own = Sparse::with_capacity(24);
@@ -256,10 +334,13 @@ impl<'a> LineModel<'a> {
                     let factor = self.of_spot(spot);
                     let (_, theta, _) = self.spot(of_a);
                     let at = SPOTS + if of_a { 0 } else { 2 };
+                    let bulk = self.bulk_of_spot(of_a);
                     own.push((local(at), -factor * x[theta[1]]));
-                    own.push((local(at + 1), factor * x[theta[0]]));
-                    if of_a {
-                        of_z_a(factor, &mut own);
+                    own.push((local(at + 1), factor * (x[theta[0]] + force * bulk.by_place[1][(2, 2)])));
+                    if assembled {
+                        let by = bulk.by.iter();
+                        own.extend(by.map(|(at, by)| (local(*at), factor * force * by[(2, 2)])));
+                        of_z(of_a, factor, factor * bulk.moved[(2, 2)], &mut own);
                     }
                 }
                 channel => {
@@ -268,10 +349,15 @@ impl<'a> LineModel<'a> {
                     let factor = self.sensor(axis.gain, axis.delay);
                     let d = self.direction(axis);
                     let (moved, theta) = self.point(cell);
+                    let bulk = self.bulk(cell).filter(|_| assembled);
                     // d · (θ × r) = r · (d × θ)
                     for place in 0..3 {
                         let (next, last) = ((place + 1) % 3, (place + 2) % 3);
-                        let by = factor * (d[next] * x[theta[last]] - d[last] * x[theta[next]]);
+                        let mut by = d[next] * x[theta[last]] - d[last] * x[theta[next]];
+                        if let Some(bulk) = &bulk {
+                            by += along(d, &bulk.by_place[place], &forces);
+                        }
+                        let by = factor * by;
                         if by != C::default() {
                             for base in std::iter::once(cell.point).chain(cell.aim) {
                                 own.push((local(base + place), by));
@@ -280,14 +366,27 @@ impl<'a> LineModel<'a> {
                     }
                     if let Some((at, across)) = &axis.across {
                         for (k, across) in across.iter().enumerate() {
-                            let along: C =
+                            let mut seen: C =
                                 across.iter().zip(&moved).map(|(part, of)| part * dot(of, x)).sum();
-                            own.push((local(at + k), factor * along));
+                            if let Some(bulk) = &bulk {
+                                seen += along(*across, &bulk.moved, &forces);
+                            }
+                            own.push((local(at + k), factor * seen));
                         }
                     }
-                    let of_z = self.of_z_a(row);
-                    if of_z != C::default() {
-                        of_z_a(of_z, &mut own);
+                    if let Some(bulk) = &bulk {
+                        let by = bulk.by.iter();
+                        own.extend(by.map(|(at, by)| (local(*at), factor * along(d, by, &forces))));
+                        // forces along x and y are proportional to the stiffness
+                        for axis in 0..2 {
+                            let mut own_force = [C::default(); 3];
+                            own_force[axis] = forces[axis];
+                            own.push((local(LATERAL + axis), factor * along(d, &bulk.moved, &own_force)));
+                        }
+                        let of_a = cell.group == Group::SpecimenA;
+                        let of_surface = if of_a { factor * d[2] } else { C::default() };
+                        let per_newton: f64 = (0..3).map(|row| d[row] * bulk.moved[(row, 2)]).sum();
+                        of_z(of_a, of_surface, factor * per_newton, &mut own);
                     }
                 }
             }
@@ -306,9 +405,10 @@ impl<'a> LineModel<'a> {
     fn form_terms(&self, x: &DVector<C>) -> [C; FORM_TERMS + INERTIA_TERMS] {
         let (s, t) = (self.s, dot(&self.t, x) + self.t_offset);
         let (z, turn_x, turn_y) = (x[2], x[3], x[4]);
-        let b = self.block.specimen_b().unwrap_or(0);
-        let against_the_arm =
-            [dot(&self.z_b, x) - z, x[b + 3] - turn_x, turn_y - x[b + 4]].map(|moved| s * s * moved);
+        // without points of its own specimen B has the inertia of its arm
+        let against_the_arm = self.block.specimen_b().map_or([C::default(); 3], |b| {
+            [dot(&self.z_b, x) - z, x[b + 3] - turn_x, turn_y - x[b + 4]].map(|moved| s * s * moved)
+        });
         [
             t,
             s * t,

@@ -43,6 +43,9 @@ pub struct Stiffness {
     pub lines: usize,
     /// Relative standard deviation of k_T by cause; the squares add up.
     pub budget: BTreeMap<Cause, f64>,
+    /// Whether nothing measures specimen B itself, so that k_T is the stiffness between specimen
+    /// A's surface and arm B: the bulk of specimen B and its clamp are part of it.
+    pub includes_specimen_b: bool,
     /// k_T bin by bin.
     pub of_frequency: Vec<OfFrequency>,
     /// Tests of the assumptions.
@@ -90,6 +93,7 @@ pub fn of(
         band_hz: input.band_hz,
         lines: blocks.iter().map(|block| block.lines.len()).sum(),
         budget,
+        includes_specimen_b: input.includes_specimen_b(),
         of_frequency: of_frequency(blocks, solution, compliance),
         doubts: diagnosis.doubts(),
         diagnosis,

@@ -2,6 +2,7 @@
 //! are not known exactly, each with its prior; positions, angles, gains and delays have prior
 //! standard deviations.
 
+use super::elastic;
 use crate::substructuring::averaged::Priors as Positions;
 use serde::Serialize;
 
@@ -18,8 +19,27 @@ pub const FORM_TERMS: usize = 11;
 pub const INERTIA_B: usize = FORM + FORM_TERMS;
 /// Number of its parameters.
 pub const INERTIA_TERMS: usize = 3;
+/// Index of the elastic shapes of specimens A and B (`elastic`).
+pub const ELASTIC: usize = INERTIA_B + INERTIA_TERMS;
+/// If specimen B has no points: displacement of its surface at the contact per newton relative to
+/// arm B as measured by its points (m/N), then the ratio of its rotation about x to that
+/// displacement (1/m).
+pub const TIP_B: usize = ELASTIC + 2 * elastic::TERMS;
+/// Logarithms of the contact's stiffnesses along x and y, N/m.
+pub const LATERAL: usize = TIP_B + 2;
 /// x and y of spot A, then of spot B, m.
-pub const SPOTS: usize = INERTIA_B + INERTIA_TERMS;
+pub const SPOTS: usize = LATERAL + 2;
+/// Names of the parameters of the elastic shapes.
+const ELASTIC_NAMES: [&str; 2 * elastic::TERMS] = [
+    "the shear of specimen A",
+    "the bending of specimen A along z",
+    "the bending of specimen A along x",
+    "the distance of specimen A's clamp",
+    "the shear of specimen B relative to A's",
+    "the bending of specimen B along z relative to A's",
+    "the bending of specimen B along x relative to A's",
+    "the distance of specimen B's clamp relative to A's",
+];
 /// Relative errors of gain: spot A, spot B, and the point's x, y, z.
 pub const GAINS: usize = SPOTS + 4;
 /// Errors of delay of the same channels, s.
@@ -40,12 +60,24 @@ const SENSORS: [&str; 5] = [
 /// an error of its gain and delay. Then only the priors determine gain and delay. This minimum
 /// keeps every combination of them determined when they are stated as exact.
 const LOAD_CELL_GAIN: f64 = 1e-3;
-/// The same for its delay, s.
-const LOAD_CELL_SKEW_S: f64 = 1e-7;
+/// The same for the delay of the force relative to T, s: load cells and their mounts have losses,
+/// c = βk with β of some 10 µs, so that the force leads their elastic force T by β.
+const LOAD_CELL_SKEW_S: f64 = 2e-5;
 /// Upper bound of a specimen's mass, kg.
 const SPECIMEN_KG: f64 = 0.5;
 /// Upper bound of the distance of its centre of gravity from the contact, m.
 const SPECIMEN_M: f64 = 0.03;
+/// Upper bound of the compliance between arm B and specimen B's surface, m/N: a clamp of 30 N/µm.
+const TIP_M_PER_N: f64 = 3e-8;
+/// Change of the displacement of specimen B's material with the height over that of its surface,
+/// 1/m, and the standard deviation: 1.5/L for a bent cantilever of the length L, 1/L for shear or if
+/// it turns in its clamp, 0 if the clamp or arm B gives along z.
+const TURN_PER_M: [f64; 2] = [110.0, 50.0];
+
+/// Stiffnesses of a contact across the sliding direction and normal to it, N/m, and the standard
+/// deviation of their logarithms: only the specimens' deformation shows them.
+const LATERAL_N_PER_M: [f64; 2] = [1.5e8, 2.2e8];
+const LATERAL_SPREAD: f64 = 0.6;
 
 /// One parameter: start value, prior width, and the cause under which its share of the uncertainty
 /// is listed.
@@ -87,16 +119,31 @@ pub struct Parameters(Vec<Parameter>);
 
 impl Parameters {
     /// The parameters that every fit has. `spots_m` are the positions of the spots relative to the
-    /// contact.
-    pub fn new(priors: &ContactPriors, compliance_m_per_n: f64, spots_m: [[f64; 3]; 2]) -> Self {
+    /// contact, `specimens` the priors of the specimens' shapes ([`elastic::priors`]).
+    pub fn new(
+        priors: &ContactPriors,
+        compliance_m_per_n: f64,
+        spots_m: [[f64; 3]; 2],
+        specimens: [[f64; 2]; 2 * elastic::TERMS],
+    ) -> Self {
         let named = |name: &str, start, sigma, cause| Parameter::new(name.to_owned(), start, sigma, cause);
         let free = |name: &str, start| named(name, start, f64::INFINITY, Cause::Noise);
         let mut all = vec![free("1/k_T", compliance_m_per_n), free("c_T/k_T", 0.0)];
         all.push(named("the load cells' gain", 1.0, priors.gain.max(LOAD_CELL_GAIN), Cause::Gains));
-        all.push(named("the load cells' delay", 0.0, priors.skew_s.max(LOAD_CELL_SKEW_S), Cause::Skew));
+        all.push(named("the load cells' delay", 0.0, priors.skew_s.hypot(LOAD_CELL_SKEW_S), Cause::Skew));
         all.extend((2..FORM_TERMS).map(|_| free("the force's form", 0.0)));
         for lever in [1.0, SPECIMEN_M, SPECIMEN_M] {
             all.push(named("specimen B's inertia", 0.0, SPECIMEN_KG * lever, Cause::Noise));
+        }
+        for (what, [start, sigma]) in ELASTIC_NAMES.iter().zip(specimens) {
+            all.push(named(what, start, sigma, Cause::Bending));
+        }
+        all.push(named("the compliance of specimen B and its clamp", 0.0, TIP_M_PER_N, Cause::Bending));
+        let [turn, sigma] = TURN_PER_M;
+        all.push(named("the rotation of specimen B's surface", turn, sigma, Cause::Bending));
+        for (axis, stiffness) in ["x", "y"].into_iter().zip(LATERAL_N_PER_M) {
+            let name = format!("the contact's stiffness along {axis}");
+            all.push(named(&name, stiffness.ln(), LATERAL_SPREAD, Cause::Bending));
         }
         for (spot, side) in spots_m.into_iter().zip(["A", "B"]) {
             for (axis, of) in ["x", "y"].into_iter().enumerate() {
@@ -212,6 +259,8 @@ pub enum Cause {
     Skew,
     /// The directions of the fixed sensors' axes.
     SensorAxes,
+    /// Bending and shear of the specimens between the sensors and the contact.
+    Bending,
     /// The model does not describe the signals down to their noise.
     Misfit,
 }
@@ -229,6 +278,7 @@ impl Cause {
             Cause::Gains => "gains",
             Cause::Skew => "skew",
             Cause::SensorAxes => "sensor-axes",
+            Cause::Bending => "bending",
             Cause::Misfit => "misfit",
         }
     }

@@ -79,6 +79,7 @@ impl Plan {
         self.check_limits(faults);
         self.check_shaker(faults);
         self.check_contact(faults);
+        self.check_specimens(faults);
         self.check_priors(faults);
         check_sensors(&self.channel, faults);
         self.check_geometry(faults);
@@ -154,6 +155,34 @@ impl Plan {
             at,
             "contact.parallel_path is a ratio of stiffness, from 0 to 1",
         );
+    }
+
+    fn check_specimens(&self, faults: &mut Faults) {
+        let Some(specimens) = &self.specimens else { return };
+        for (name, own) in specimens.get_ref().both() {
+            let Some(own) = own else { continue };
+            let length = |value: f64| value > 1e-4 && value < 1.0;
+            faults.unless(
+                own.section_m.iter().chain([&own.clamp_m]).all(|value| length(*value)),
+                specimens.span().start,
+                format!("specimens.{name}: section_m and clamp_m are in m, not in mm: from 0.0001 to 1"),
+            );
+            faults.unless(
+                own.young_pa >= 1e8 && own.young_pa.is_finite(),
+                specimens.span().start,
+                format!("specimens.{name}.young_pa is in Pa, not in GPa: at least 1e8"),
+            );
+            faults.unless(
+                own.poisson.is_none_or(|value| (0.0..=0.5).contains(&value)),
+                specimens.span().start,
+                format!("specimens.{name}.poisson is from 0 to 0.5"),
+            );
+            faults.unless(
+                own.uncertainty.is_none_or(|value| (0.0..=2.0).contains(&value)),
+                specimens.span().start,
+                format!("specimens.{name}.uncertainty is relative: from 0 to 2"),
+            );
+        }
     }
 
     fn check_priors(&self, faults: &mut Faults) {

@@ -6,7 +6,7 @@
 //! (`[priors]`). Unknown fields are refused, and every error names file, line and field. Lengths
 //! are in m, forces in N, times in s unless a name states otherwise.
 
-use crate::contact::ContactPriors;
+use crate::contact::{ContactPriors, Specimen};
 use crate::structure::Structure;
 use faults::Faults;
 use jointrig_protocol::request::Configuration;
@@ -28,7 +28,7 @@ mod structure;
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
 /// All cells of the paper's campaign and those on the specimen, three good hits in each.
 pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
-/// The minimum for the contact's own stiffness: 63 cells of two hits.
+/// The minimum for the contact's own stiffness: 67 cells of two hits.
 pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
 /// The paper's campaign and the cells on the specimen: yields both stiffnesses.
 pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
@@ -103,6 +103,8 @@ pub struct Plan {
     pub shaker: Option<Spanned<ShakerPlan>>,
     /// Prior knowledge of contact and static arm; if absent, only the records count.
     pub contact: Option<Spanned<ContactPlan>>,
+    /// The specimens' bulk; what is absent follows from their points, or widens the interval.
+    pub specimens: Option<Spanned<SpecimensPlan>>,
     /// The laboratory's measurement errors; if absent, the usual values for careful manual work.
     pub priors: Option<Spanned<PriorsPlan>>,
     /// The sensors on the device's channels; channels that are not listed are taken as the device
@@ -251,6 +253,48 @@ pub struct ContactPlan {
     pub effective_mass_kg: Option<f64>,
 }
 
+/// The specimens as beams between contact and clamp.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpecimensPlan {
+    /// Specimen A.
+    pub a: Option<SpecimenPlan>,
+    /// Specimen B.
+    pub b: Option<SpecimenPlan>,
+}
+
+impl SpecimensPlan {
+    /// Both, A first, with the names of their fields.
+    pub fn both(&self) -> [(&'static str, Option<SpecimenPlan>); 2] {
+        [("a", self.a), ("b", self.b)]
+    }
+}
+
+/// A specimen as a beam along y of a rectangular section.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpecimenPlan {
+    /// Edges of its section along x and along the sliding direction z, m.
+    pub section_m: [f64; 2],
+    /// Distance from the contact to the clamp, m.
+    pub clamp_m: f64,
+    /// Young's modulus, Pa.
+    pub young_pa: f64,
+    /// Poisson's ratio; 0.3 if absent.
+    pub poisson: Option<f64>,
+    /// Relative standard deviation of its compliances; 0.2 if absent.
+    pub uncertainty: Option<f64>,
+}
+
+impl SpecimenPlan {
+    /// Its bulk as the analysis takes it.
+    pub fn known(&self) -> Specimen {
+        let poisson = self.poisson.unwrap_or(0.3);
+        let uncertainty = self.uncertainty.unwrap_or(0.2);
+        Specimen::beam(self.section_m, self.young_pa, poisson, self.clamp_m, uncertainty)
+    }
+}
+
 /// When a cell's FRFs are good enough.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -294,6 +338,12 @@ pub fn configuration_named(name: &str) -> Option<Configuration> {
 }
 
 impl Plan {
+    /// What the plan states of the bulk of specimens A and B.
+    pub fn known_specimens(&self) -> [Option<Specimen>; 2] {
+        let stated = self.specimens.as_ref().map_or_else(SpecimensPlan::default, |own| *own.get_ref());
+        stated.both().map(|(_, own)| own.as_ref().map(SpecimenPlan::known))
+    }
+
     /// Samples of a record from the trigger onwards.
     pub fn post_trigger_scans(&self) -> u64 {
         let record = self.record.get_ref();

@@ -159,7 +159,7 @@ fn of_stiffness(own: &Stiffness, joint: Option<&contact::Joint>, slips: bool) ->
         band_hz: Some(own.band_hz.into()),
         budget: budget.iter().map(|(cause, share)| (cause.name(), *share)).collect(),
         why: match (trusted, slips) {
-            (true, _) => say::identified(budget, joint.map_or(0, |both| both.levels)),
+            (true, _) => say::identified(own, budget, joint.map_or(0, |both| both.levels)),
             (_, true) => say::slipping(),
             _ => say::doubted(own),
         },

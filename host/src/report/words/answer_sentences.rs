@@ -16,15 +16,20 @@ pub fn with_interval(k: &Interval) -> String {
 
 /// Why this k_T is credible, and what determines its interval; `levels` is the number of shaker
 /// levels used in addition to the hits.
-pub fn identified(budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
+pub fn identified(own: &Stiffness, budget: &BTreeMap<Cause, f64>, levels: usize) -> String {
+    let planes = if own.includes_specimen_b {
+        "between specimen A's surface and arm B: no sensor is on specimen B, so its bulk and its clamp are part of it"
+    } else {
+        "between the specimens' surfaces at the contact, without the specimens' bulk, and independent of the clamps"
+    };
     let beside = match levels {
         0 => String::new(),
         1 => " A level of the shaker, corrected by the hits, is included as well.".into(),
         _ => format!(" {levels} levels of the shaker, corrected by the hits, are included as well."),
     };
     format!(
-        "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, independent of \
-         the clamps.{beside} Most of its uncertainty comes from {}.",
+        "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, {planes}.{beside} \
+         Most of its uncertainty comes from {}.",
         largest(budget)
     )
 }
@@ -70,6 +75,7 @@ fn of_cause(cause: Cause) -> &'static str {
         Cause::Gains => "gains",
         Cause::Skew => "delays between channels",
         Cause::SensorAxes => "the directions of the fixed sensors' axes",
+        Cause::Bending => "bending and shear of the specimens between sensors and contact",
         Cause::Misfit => "signals that the model does not explain",
     }
 }
@@ -90,7 +96,7 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
             "the load cells and arm B's motion do not give the force in the hits on B alone (is a cell loose, or a point misplaced?)"
         }
         Doubt::SpecimenA => {
-            "the points on specimen A do not move as one rigid body (is one misplaced, or does the specimen bend?)"
+            "the points on specimen A do not move as one body that bends under the contact's force (is one misplaced or loose?)"
         }
         Doubt::Spots => {
             "the spots next to the contact do not move with arm B and the specimen (a specimen that moves against arm B needs points of its own: grouping 6)"
