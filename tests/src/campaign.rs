@@ -45,7 +45,7 @@ pub fn short_contact_plan() -> String {
     for (old, new) in [
         ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
         ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\", \"I_MZ\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
-        ("[\"S1\", \"S2\", \"S3\", \"S4\", \"S5\", \"S6\",", "[\"S1\", \"S3\", \"S5\","),
+        ("[\"C1\", \"C2\", \"C3\", \"C4\", \"D1\", \"D2\", \"D3\",", "[\"C1\", \"C2\", \"C3\","),
         ("length_s = 2.0", "length_s = 1.0"),
         ("exponential_per_s = 2.3", "exponential_per_s = 4.6"),
     ] {

@@ -50,8 +50,8 @@ impl Default for Drawn {
     }
 }
 
-/// The rig with this number. A third of the rigs also have a clamp on side B, and on specimen B six
-/// points T1–T6 and the marks M1 and M2: the points and marks of specimen A, mirrored.
+/// The rig with this number. A third of the rigs also have a clamp on side B. Specimen B has the
+/// marks M1 and M2: those of specimen A, mirrored.
 ///
 /// Contacts of 60 N/µm and more, clamps × 0.3…3, local yaw modes at about 100…350 Hz, arms × 0.6…2,
 /// rods, load cells, suspensions, damping, and floors × 0.3…3: each drawn independently.
@@ -87,8 +87,8 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     if number.is_multiple_of(3) {
         rig.clamp_b.rigid = false;
         clamp(&mut rig.clamp_b.loaded, -1.0, [2.0, 20.0]);
-        mirror_points(&mut rig);
     }
+    mirror_marks(&mut rig);
     for specimen in [&mut rig.bodies.specimen_a, &mut rig.bodies.specimen_b] {
         let factor = between(0.7, 1.5);
         specimen.mass_kg *= factor;
@@ -137,14 +137,13 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
     if drawn.accelerometers { with_accelerometers(rig, drawn.errors) } else { rig }
 }
 
-/// Adds the points of specimen A, mirrored, to specimen B: T1–T6, M1 and M2.
-fn mirror_points(rig: &mut RigConfig) {
-    let of_a = rig.responses.iter().filter(|point| point.body == BodyName::SpecimenA);
+/// Adds the marks of specimen A, mirrored, to specimen B.
+fn mirror_marks(rig: &mut RigConfig) {
+    let of_a = rig.responses.iter().filter(|point| point.name.starts_with('N'));
     let mirrored = of_a.map(|point| ResponsePoint {
-        name: point.name.replace('S', "T").replace('N', "M"),
+        name: point.name.replace('N', "M"),
         body: BodyName::SpecimenB,
         position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
-        speckle: false,
         ..*point
     });
     let mirrored: Vec<_> = mirrored.collect();
@@ -154,9 +153,8 @@ fn mirror_points(rig: &mut RigConfig) {
 /// The same rig with specimens, or specimens and arms, of steel or aluminium that bend; masses
 /// remain. Both specimens have one material and section with edges of 8…20 mm; they reach from the
 /// contact 1.1…1.6 times as far as the clamp. Arms are of one material too, with edges of 0.7…1.1
-/// times those of the default rig's boxes. Specimen B has the points T1–T6, M1 and M2 whether or
-/// not its clamp is rigid. The draw has its own random stream, so that the rest of the rig is that
-/// of the same number without it.
+/// times those of the default rig's boxes. The draw has its own random stream, so that the rest of
+/// the rig is that of the same number without it.
 pub fn elastic(number: u64, mut rig: RigConfig, which: Elastic) -> RigConfig {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0x00e1_a571_0000 + number);
     let mut between = |low: f64, high: f64| -> f64 {
@@ -201,9 +199,6 @@ pub fn elastic(number: u64, mut rig: RigConfig, which: Elastic) -> RigConfig {
                 elements: 2,
             });
         }
-    }
-    if rig.clamp_b.rigid {
-        mirror_points(&mut rig);
     }
     rig
 }
@@ -250,23 +245,9 @@ fn scale(bushing: &mut Bushing, factor: f64) {
     bushing.rotation_nm_per_rad = bushing.rotation_nm_per_rad.map(|k| k * factor);
 }
 
-/// The plan for such a rig: `contact.toml` with its points T1–T6 if it has them, and the known
-/// standard deviations of its errors.
+/// The plan for such a rig: `contact.toml` with the known standard deviations of its errors.
 pub fn contact_plan(rig: &RigConfig) -> String {
-    let mut plan = jointrig::campaign::plan::CONTACT.to_owned();
-    if !rig.clamp_b.rigid {
-        let points: Vec<&ResponsePoint> = rig
-            .responses
-            .iter()
-            .filter(|point| point.body == BodyName::SpecimenB && point.sigma_m.is_none())
-            .collect();
-        let (names, rows) = (names(&points), rows(&points));
-        plan = plan
-            .replace("responses = [\"S1\"", &format!("responses = [{names}\"S1\""))
-            .replace("responses = [\"B1\"", &format!("responses = [{names}\"B1\""))
-            .replace("response = [\n", &format!("response = [\n{rows}"));
-    }
-    with_priors(&plan, rig)
+    with_priors(jointrig::campaign::plan::CONTACT, rig)
 }
 
 /// A plan with the known standard deviations of the rig's errors.
@@ -287,12 +268,12 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
     )
 }
 
-/// The same plan with two marks next to the contact on each specimen that has points, placed as
-/// accurately as the spots: N1 and N2, M1 and M2.
+/// The same plan with two marks next to the contact on each specimen, placed as accurately as the
+/// spots: N1 and N2, M1 and M2.
 pub fn near_plan(rig: &RigConfig) -> String {
     let near: Vec<&ResponsePoint> = rig.responses.iter().filter(|point| point.sigma_m.is_some()).collect();
     contact_plan(rig)
-        .replace("\"S1\", \"S2\"", &format!("{}\"S1\", \"S2\"", names(&near)))
+        .replace("\"C1\", \"C2\"", &format!("{}\"C1\", \"C2\"", names(&near)))
         .replace("response = [\n", &format!("response = [\n{}", rows(&near)))
 }
 
@@ -313,11 +294,6 @@ fn rows(points: &[&ResponsePoint]) -> String {
         )
     };
     points.iter().map(row).collect::<Vec<_>>().concat()
-}
-
-/// As many cells as in `contact.toml`: N1 and N2 replace S5 and S6.
-pub fn near_instead_plan(rig: &RigConfig) -> String {
-    near_plan(rig).replace(", \"S5\", \"S6\"", "")
 }
 
 /// Frequencies of the shaker's levels on such a rig, Hz.
@@ -358,10 +334,6 @@ mod tests {
             {
                 assert!(body.beam.take().is_some());
             }
-            for name in ["N1", "N2", "M1", "M2"] {
-                assert!(same.responses.iter().any(|point| point.name == name), "{number} {name}");
-            }
-            same.responses.truncate(rigid.responses.len());
             assert_eq!(same, rigid, "{number}");
         }
         assert!(soft > 0 && stiff > 0, "{soft} {stiff}");

@@ -29,8 +29,9 @@ const fn source(
     Source { table, package, module, test, part: None }
 }
 
-const SOURCES: [Source; 10] = [
+const SOURCES: [Source; 11] = [
     source("contact", "jointrig-tests", "contact_accuracy", "accuracy_of_the_contacts_own_stiffness"),
+    source("bending", "jointrig-tests", "contact_accuracy", "contacts_of_specimens_that_bend"),
     Source {
         part: Some(("PLAN", "1")),
         ..source("marks", "jointrig-tests", "contact_accuracy", "marks_beside_the_contact")

@@ -69,7 +69,6 @@ fn one(plan: &Plan, geometry: &Geometry, contact_n_per_m: f64) -> Option<Expecte
     let mut rig = RigConfig::default();
     let stiffer = contact_n_per_m / rig.contact.stiffness_n_per_m[2];
     rig.contact.stiffness_n_per_m = rig.contact.stiffness_n_per_m.map(|k| k * stiffer);
-    rig.clamp_b.rigid = geometry.ajb.channels.iter().all(|p| p.grouping != Grouping::SpecimenB);
     let spots = spots(plan);
     let mut simulation = Simulation {
         plan,
@@ -303,11 +302,14 @@ mod tests {
 
     #[test]
     fn the_interval_to_expect_is_what_campaigns_have() {
-        // docs/accuracy.md: 3 % with lasers; a campaign on the default rig has 7.6 % with
-        // accelerometers
+        // campaigns on the default rig have 4.5 % with lasers, and 15 % with accelerometers: nothing
+        // is stated of the bulk between them and the contact
         let (lasers, accelerometers) = (half(CONTACT), half(CONTACT_BY_HAND));
-        assert!((0.015..0.06).contains(&lasers), "{lasers}");
-        assert!((0.05..0.11).contains(&accelerometers), "{accelerometers}");
+        assert!((0.02..0.06).contains(&lasers), "{lasers}");
+        assert!((0.1..0.2).contains(&accelerometers), "{accelerometers}");
+        let steel = "{ section_m = [0.018, 0.014], clamp_m = 0.012, young_pa = 2.1e11 }";
+        let stated = format!("{CONTACT_BY_HAND}\n[specimens]\na = {steel}\nb = {steel}\n");
+        assert!(half(&stated) < 0.7 * accelerometers);
         // more hits leave less noise, and worse positions widen it, although the signals correct
         // them
         let more = CONTACT_BY_HAND.replace("wanted = 10", "wanted = 25");

@@ -35,8 +35,8 @@ fn the_contacts_stiffness_is_found_with_accelerometers_and_a_hammer_by_hand() {
     let contact = &results["answer"]["contact"];
     let [low, high] = [0, 1].map(|end| contact["k_t_n_per_m"]["ci95"][end].as_f64().unwrap());
     println!("{said}\n{contact}");
-    // positions to 0.2 mm leave some per cent
-    assert!(low < TRUTH && TRUTH < high && high < 1.3 * low, "{contact}");
+    // positions to 0.2 mm, and specimens of which nothing is stated, leave 15 % either way
+    assert!(low < TRUTH && TRUTH < high && high < 1.45 * low, "{contact}");
     // the masses are told, and change nothing: all sensors on B stay
     let checks = results["checks"].as_array().unwrap();
     let masses = checks.iter().find(|check| check["name"] == "sensor-masses").unwrap();

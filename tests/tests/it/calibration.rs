@@ -70,7 +70,9 @@ fn a_calibration_corrected_afterwards_changes_the_answer_and_no_record() {
     let said = calibrate(&file, &laboratory(folder.path(), &map, &FORCES, 1.02), why);
     assert!(FORCES.iter().all(|name| said.contains(name)) && said.contains("+2.00 %"), "{said}");
     let after = k_t(&file);
-    assert!((after / before * 1.02 - 1.0).abs() < 2e-4, "{before:.5e}, then {after:.5e}");
+    // what the specimens' compliances are expected to be does not scale with the forces: a part of
+    // the interval (4 %) that is as small as the change
+    assert!((after / before * 1.02 - 1.0).abs() < 1e-3, "{before:.5e}, then {after:.5e}");
     assert_eq!(measured(&file), raw, "records, and what they were measured with, stay as they are");
     assert_eq!(Store::open_read_only(&file).unwrap().verify().unwrap(), []);
 

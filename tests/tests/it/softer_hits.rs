@@ -10,7 +10,7 @@ use jointrig_tests::campaign::{rows, run};
 fn every_second_cell_of_an_impact_begins_with_the_softer_force() {
     let (head, rest) = CONTACT.split_once("# B alone").unwrap();
     let (_, geometry) = rest.split_once("# Grouping").unwrap();
-    let cells = "[[configuration]]\nname = \"AJB\"\nimpacts = [\"AZ1\", \"AZ3\"]\nresponses = [\"S1\", \"S3\", \"B1\"]\n\n";
+    let cells = "[[configuration]]\nname = \"AJB\"\nimpacts = [\"AZ1\", \"AZ3\"]\nresponses = [\"C1\", \"C3\", \"B1\"]\n\n";
     let plan = format!("{head}{cells}# Grouping{geometry}")
         .replace("length_s = 2.0", "length_s = 1.0")
         .replace("exponential_per_s = 2.3", "exponential_per_s = 4.6");

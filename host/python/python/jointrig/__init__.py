@@ -6,7 +6,7 @@
     found = lab.analyse()                  # found.results: what `jointrig analyse` writes to results.json
 
     lab = jr.new("own.jrig", "plan.toml")  # a campaign measured with other equipment:
-    lab.add_hits("AJB", "AZ1", "S1", fs_hz=51_200, force_n=force, channels={...}, units={...})
+    lab.add_hits("AJB", "AZ1", "C1", fs_hz=51_200, force_n=force, channels={...}, units={...})
 
 All arrays are numpy's, all units SI unless stated. Hits and levels can be added to a campaign file; no device can be opened from here.
 `jointrig.bridge` makes a program a recorder that the command measures with.

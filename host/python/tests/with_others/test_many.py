@@ -25,7 +25,7 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command("plan", "new", folder / "plan.toml", "--template", "contact")
     text = (folder / "plan.toml").read_text()
     text = re.sub(r'impacts = \["BZ1".*\]', 'impacts = ["BZ1", "BZ2", "BZ3"]', text)
-    text = re.sub(r'impacts = \["AZ1".*\]\nresponses = .*', 'impacts = ["AZ1", "AZ3"]\nresponses = ["S1", "S3", "S5", "B1", "B2", "B3"]', text)
+    text = re.sub(r'impacts = \["AZ1".*\]\nresponses = .*', 'impacts = ["AZ1", "AZ3"]\nresponses = ["C1", "C2", "C3", "B1", "B2", "B3"]', text)
     text = text.replace("length_s = 2.0", "length_s = 1.0").replace("exponential_per_s = 2.3", "exponential_per_s = 4.6")
     (folder / "plan.toml").write_text(text)
     softer = text.replace("target_n = 50.0", "target_n = 25.0").replace("weak_n = 30.0", "weak_n = 12.0")

@@ -129,7 +129,7 @@ def test_a_recipe(
     title: str, write: Callable[[dict[str, np.ndarray], Path], None], within: float, lab_file: Path, tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    records = jr.open(lab_file).records(configuration="AJB", impact="AZ1", response="S1", kept=True)
+    records = jr.open(lab_file).records(configuration="AJB", impact="AZ1", response="C1", kept=True)
     hits = {name: np.stack([record.signal(own) for record in records]) for name, own in OURS.items()}
     write(hits, tmp_path)
     command("plan", "new", tmp_path / "plan.toml", "--template", "contact")
@@ -138,7 +138,7 @@ def test_a_recipe(
     exec(section(""), names)
     exec(section(title), names)
     stored = jr.open("lab.jrig").records(kept=True)
-    assert len(stored) == len(records) and (stored[0].impact, stored[0].response) == ("AZ1", "S1")
+    assert len(stored) == len(records) and (stored[0].impact, stored[0].response) == ("AZ1", "C1")
     for ours, theirs in zip(stored, records, strict=True):
         for name, own in OURS.items():
             scale = FULL[name] if title == "WAV" else np.abs(theirs.signal(own)).max()

@@ -435,7 +435,7 @@ mod tests {
     fn channels_get_roles_and_scales_or_the_remedy_is_named() {
         let plan = Plan::parse(CONTACT, "contact.toml").expect("a plan");
         let assign = |channels: &[(&str, Option<&str>)], stated: &str| {
-            assigned(&plan, "S1", &file(channels), &stated.parse().expect("stated"))
+            assigned(&plan, "C1", &file(channels), &stated.parse().expect("stated"))
         };
         let usual =
             [("hammer", Some("N")), ("LDV_A", Some("mm/s")), ("ai7", Some("V")), ("spare", Some("V"))];

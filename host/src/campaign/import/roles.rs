@@ -69,15 +69,15 @@ mod tests {
     #[test]
     fn names_of_the_rig_and_of_exports_have_their_roles() {
         let plan = Plan::parse(CONTACT, "contact.toml").expect("a plan");
-        let role = |name: &str, quantity| role_of(&plan, "S1", name, quantity);
+        let role = |name: &str, quantity| role_of(&plan, "C1", name, quantity);
         let (force, velocity) = (Quantity::Force, Quantity::Velocity);
         assert_eq!(role("hammer", force), Some(Role::HammerForce));
         assert_eq!(role("hammer", velocity), None);
-        assert_eq!(role("S1:z", velocity), Some(Role::Response(Axis::Z)));
+        assert_eq!(role("C1:z", velocity), Some(Role::Response(Axis::Z)));
         assert_eq!(role("vib_x", velocity), Some(Role::Response(Axis::X)));
-        assert_eq!(role("S1:2", velocity), Some(Role::Response(Axis::Y)));
-        assert_eq!(role("s1", velocity), Some(Role::Response(Axis::X)));
-        assert_eq!(role("S11", velocity), None);
+        assert_eq!(role("C1:2", velocity), Some(Role::Response(Axis::Y)));
+        assert_eq!(role("c1", velocity), Some(Role::Response(Axis::X)));
+        assert_eq!(role("C11", velocity), None);
         assert_eq!(role_of(&plan, "", "1", velocity), None);
         assert_eq!(role("LDV_A", velocity), Some(Role::SpecimenA));
         assert_eq!(role("ldv b", velocity), Some(Role::SpecimenB));

@@ -41,11 +41,11 @@ fn hammer_and_laser_move_as_little_as_they_can() {
 }
 
 #[test]
-fn the_contacts_plan_has_63_cells_and_no_a() {
+fn the_contacts_plan_has_67_cells_and_no_a() {
     let plan = Plan::parse(CONTACT, "contact.toml").expect("a good plan");
     let cells = plan.cells();
     let of = |wanted| cells.iter().filter(|cell| cell.configuration == wanted).count();
-    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 27, 36));
+    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 27, 40));
     assert_eq!((plan.hits.get_ref().wanted, plan.hits.get_ref().minimum), (2, 2));
     assert_eq!(plan.configuration.len(), 2);
 }
@@ -163,6 +163,8 @@ fn what_may_be_left_out_is_checked_where_it_stands() {
         ("[shaker]\nfrequencies_hz = [100]\namplitudes_m = [0.1]", "shaker.amplitudes_m"),
         ("[contact]\nnormal_load_n = 0", "contact: normal_load_n"),
         ("[contact]\nparallel_path = 1.0133", "contact.parallel_path"),
+        ("[specimens]\na = { section_m = [18, 14], clamp_m = 12, young_pa = 2e11 }", "not in mm"),
+        ("[specimens]\nb = { section_m = [0.018, 0.014], clamp_m = 0.012, young_pa = 210 }", "not in GPa"),
         ("[shaker]\nfrequencies_hz = []\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[shaker]\nfrequencies_hz = [6000]\namplitudes_m = [1e-7]", "shaker.frequencies_hz"),
         ("[enough]\nrandom_error = 2.0\nband_hz = [100, 800]", "enough.random_error"),

@@ -364,8 +364,8 @@ mod tests {
         };
         let whole = "{configuration}_{impact}_{response}_{hit}";
         // a name with the separator in it
-        assert_eq!(found(whole, "AJB_I_MZ_S3_017").as_deref(), Some("AJB/I_MZ/S3"));
-        assert_eq!(found(whole, "AJB_I_MZ_S3"), None);
+        assert_eq!(found(whole, "AJB_I_MZ_C3_017").as_deref(), Some("AJB/I_MZ/C3"));
+        assert_eq!(found(whole, "AJB_I_MZ_C3"), None);
         assert_eq!(found(whole, "AJB_I_MZ_S9_1"), None);
         assert_eq!(found("run 3 {impact}@{response}", "run 3 BZ2@B1").as_deref(), Some("B/BZ2/B1"));
         // the plan's vibrometer moves, so that the location must be named
