@@ -160,7 +160,7 @@ fn the_bulk_of_specimens_that_bend_is_not_taken_for_the_contact() {
 #[test]
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: specimens that bend"]
 fn contacts_of_specimens_that_bend() {
-    let (first, rigs) = (count("FIRST", 2000), count("RIGS", 36));
+    let (first, rigs) = (count("FIRST", 2000), count("RIGS", 18));
     let mut rows = Vec::new();
     for (name, which) in
         [("specimens", Elastic::Specimens), ("specimens and arms", Elastic::SpecimensAndArms)]
