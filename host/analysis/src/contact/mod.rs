@@ -63,7 +63,7 @@ use crate::substructuring::geometry::Grouping;
 use block::{Block, Group, POINT, blocks};
 use nalgebra::DVector;
 use outcome::{Variances, of_sum, trusted};
-use parameters::{FORM, Parameters, TIP_B};
+use parameters::{FORM, LATERAL, Parameters, TIP_B};
 use solver::Certainty;
 use solver::Solution;
 
@@ -268,7 +268,14 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         parameters.narrow(TIP_B, 0.0);
     }
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
-    let solution = solver::solve(&mut blocks, &parameters, sigma_per_s)?;
+    let before = blocks.clone();
+    let solution = solver::solve(&mut blocks, &parameters, sigma_per_s).or_else(|_| {
+        // specimens that hardly bend do not determine the contact's stiffnesses along x and y, and
+        // the search may not settle with them
+        (0..2).for_each(|axis| parameters.narrow(LATERAL + axis, 0.0));
+        blocks = before;
+        solver::solve(&mut blocks, &parameters, sigma_per_s)
+    })?;
     Ok(Fit { parameters, blocks, solution })
 }
 
