@@ -334,6 +334,9 @@ mod tests {
             {
                 assert!(body.beam.take().is_some());
             }
+            for name in ["N1", "N2", "M1", "M2"] {
+                assert!(same.responses.iter().any(|point| point.name == name), "{number} {name}");
+            }
             assert_eq!(same, rigid, "{number}");
         }
         assert!(soft > 0 && stiff > 0, "{soft} {stiff}");

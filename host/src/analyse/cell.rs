@@ -3,7 +3,7 @@
 
 use crate::campaign::plan::level::{Level, Moment};
 use crate::campaign::store::frf_table::ImportedFrf;
-use crate::contact::{ContactPriors, Specimen};
+use crate::contact::{Bulk, ContactPriors};
 use crate::hysteresis::HysteresisRecord;
 use crate::results::MAIN_BAND;
 use crate::spectra::MotionQuantity;
@@ -169,7 +169,7 @@ pub trait Measurements: Sync {
     }
 
     /// What is stated of the bulk of specimens A and B.
-    fn specimens(&self) -> [Option<Specimen>; 2] {
+    fn specimens(&self) -> [Option<Bulk>; 2] {
         [None; 2]
     }
 

@@ -302,8 +302,8 @@ mod tests {
 
     #[test]
     fn the_interval_to_expect_is_what_campaigns_have() {
-        // campaigns on the default rig have 4.5 % with lasers, and 15 % with accelerometers: nothing
-        // is stated of the bulk between them and the contact
+        // campaigns on the default rig have 4.5 % with lasers, and 15 % with accelerometers:
+        // nothing is stated of the bulk between them and the contact
         let (lasers, accelerometers) = (half(CONTACT), half(CONTACT_BY_HAND));
         assert!((0.02..0.06).contains(&lasers), "{lasers}");
         assert!((0.1..0.2).contains(&accelerometers), "{accelerometers}");

@@ -22,7 +22,7 @@ use crate::campaign::store::level_table::LevelRow;
 use crate::campaign::store::record_table::{Damaged, RecordRow};
 use crate::campaign::store::rows::{Rows, places as response_places};
 use crate::campaign::store::session_table::SessionInfo;
-use crate::contact::{ContactPriors, Specimen};
+use crate::contact::{Bulk, ContactPriors};
 use crate::device::channels::ChannelMap;
 use crate::hysteresis::HysteresisRecord;
 use crate::results;
@@ -473,7 +473,7 @@ impl Measurements for CampaignFile {
         Some([at("LDV_A")?, at("LDV_B")?])
     }
 
-    fn specimens(&self) -> [Option<Specimen>; 2] {
+    fn specimens(&self) -> [Option<Bulk>; 2] {
         self.plan.known_specimens()
     }
 

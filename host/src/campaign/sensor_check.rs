@@ -9,13 +9,13 @@
 //! struck along its measurement direction. The force itself pushes.
 //!
 //! Vibrometers on the specimens and load cells are further away, where the first motion depends on
-//! how the structure rocks. They are judged by transforms at real frequencies, ∫ x e^(−σt) dt, which
-//! contain no phase: there a structure has no resonance, and responds in the same way as to a static
-//! force. The specimens follow hits along the sliding direction on A; their sign counts if it is the
-//! same from the stiff to the inertial end, at every hit. A single load cell may be relieved by such
-//! a hit, but all of them together carry its force: the signs of load cells are those with which
-//! their sum equals the hammer's force. Where no signs give that sum, or more than one choice does,
-//! these records do not determine them.
+//! how the structure rocks. They are judged by transforms at real frequencies, ∫ x e^(−σt) dt,
+//! which contain no phase: there a structure has no resonance, and responds in the same way as to a
+//! static force. The specimens follow hits along the sliding direction on A; their sign counts if
+//! it is the same from the stiff to the inertial end, at every hit. A single load cell may be
+//! relieved by such a hit, but all of them together carry its force: the signs of load cells are
+//! those with which their sum equals the hammer's force. Where no signs give that sum, or more than
+//! one choice does, these records do not determine them.
 //!
 //! **Ratio calibration.** On a free, rigid mass m the hammer's impulse is the change of momentum:
 //! ∫F dt = m Δv, whatever the shape of the pulse. The ratio ∫F dt / (m Δv) is 1 if the

@@ -154,6 +154,13 @@ struct Impact<'a> {
     cells: Vec<(Group, &'a ContactCell<'a>)>,
 }
 
+impl Impact<'_> {
+    /// Whether points on specimen B are measured.
+    fn shows_specimen_b(&self) -> bool {
+        self.cells.iter().any(|(group, _)| *group == Group::SpecimenB)
+    }
+}
+
 /// Groups the cells by impact and adds their unknowns to the parameters.
 ///
 /// # Errors
@@ -297,8 +304,7 @@ fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
             found[place].cells.push((group, cell));
         }
     }
-    let of_b = |impact: &Impact<'_>| impact.cells.iter().any(|(group, _)| *group == Group::SpecimenB);
-    let specimen_b = found.iter().any(of_b);
+    let specimen_b = found.iter().any(Impact::shows_specimen_b);
     found.retain(|impact| {
         let known = |of: Group| {
             let own = impact.cells.iter().filter(|(group, _)| *group == of);
@@ -310,7 +316,9 @@ fn impacts<'a>(input: &'a Input<'a>) -> Vec<Impact<'a>> {
         known(Group::ArmB)
             && (impact.structure == Structure::B || known(Group::SpecimenA))
             // on B alone its specimen carries no force and moves with the arm
-            && (!specimen_b || known(Group::SpecimenB) || (impact.structure == Structure::B && !of_b(impact)))
+            && (!specimen_b
+                || known(Group::SpecimenB)
+                || (impact.structure == Structure::B && !impact.shows_specimen_b()))
     });
     found
 }
@@ -350,13 +358,13 @@ fn block(
         .then(|| parameters.add([along_z(impact.name, impact.direction, priors.positions.hammer_angle_rad)]));
     own.extend(along_z);
     let (shifted_by, aim_known) = shifted_by(impact, impacts);
-    let on_b = |impact: &Impact<'_>| impact.cells.iter().any(|(group, _)| *group == Group::SpecimenB);
-    // the spot on B belongs to specimen B: without its points here, arm B's do not give the spot's
-    // motion
-    let spots = match alone {
-        true if impacts.iter().any(on_b) && !on_b(impact) => 0..0,
-        true => 1..2,
-        false => 1..3,
+    let spots = if !alone {
+        1..3
+    } else if impacts.iter().any(Impact::shows_specimen_b) && !impact.shows_specimen_b() {
+        // the spot is on specimen B, whose motion arm B's points do not give where the arm bends
+        0..0
+    } else {
+        1..2
     };
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<CellValues>::new());
     for (place, (group, cell)) in impact.cells.iter().enumerate() {
@@ -421,7 +429,7 @@ fn block(
         shifted_by,
         parameters: own,
         local: Vec::new(),
-        has_specimen_b: impact.cells.iter().any(|(group, _)| *group == Group::SpecimenB),
+        has_specimen_b: impact.shows_specimen_b(),
     })
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A specimen is a beam along y from the contact (y = 0) to its clamp, loaded at the contact by the
 //! contact's force (F_x, F_y, F_z). Its sections stay plane (Timoshenko): with the shear compliance
-//! per length a = 1/(κGA) and the bending compliance b = 1/(EI), its section at y moves, relative to
-//! a rigid body that moves as the section at the contact, by
+//! per length a = 1/(κGA) and the bending compliance b = 1/(EI), its section at y moves, relative
+//! to a rigid body that moves as the section at the contact, by
 //!
 //! ```text
 //! z(y) = F_z (a y − b y³/6),   θ_x(y) = −F_z b y²/2,   y(y) = F_y y/(EA)
@@ -15,9 +15,9 @@
 //! between contact and clamp is neglected: its force is about a hundredth of F.
 //!
 //! F_z follows from the load cells. Along x and y the contact is a spring, whose stiffnesses are
-//! unknowns too. These forces do not move the spots along z, but without them the positions of the
-//! points would be fitted to the specimen's deformation: its lengths are known to micrometres from
-//! strong signals, and k_T follows them.
+//! unknowns too. These forces do not move the spots along z. But strong signals determine the
+//! positions of the points to some hundredths of a millimetre, and k_T depends on them: without
+//! these forces the positions would be fitted to the specimen's deformation.
 //!
 //! k_T is thus the stiffness between the two surfaces at y = 0: the bulk between the sensors and
 //! the contact is not part of it.
@@ -54,7 +54,7 @@ const AXIAL: f64 = KAPPA / 2.6;
 
 /// What is known of a specimen's bulk.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Specimen {
+pub struct Bulk {
     /// 1/(κGA), 1/N; and its standard deviation.
     pub shear_per_n: [f64; 2],
     /// 1/(EI) over 1/(κGA), 1/m², for bending by forces along z and along x; and the standard
@@ -64,10 +64,10 @@ pub struct Specimen {
     pub clamp_m: [f64; 2],
 }
 
-impl Specimen {
+impl Bulk {
     /// A body that does not bend.
     pub const RIGID: Self =
-        Specimen { shear_per_n: [0.0; 2], bending_per_m2: [[1.0, 0.0]; 2], clamp_m: [1.0, 0.0] };
+        Bulk { shear_per_n: [0.0; 2], bending_per_m2: [[1.0, 0.0]; 2], clamp_m: [1.0, 0.0] };
 
     /// A beam of a rectangular section with edges along x and z (m), of a material with Young's
     /// modulus (Pa) and Poisson's ratio, clamped at this distance (m); `uncertainty` is the
@@ -82,7 +82,7 @@ impl Specimen {
         let shear_modulus = young_pa / (2.0 * (1.0 + poisson));
         let shear = (KAPPA * shear_modulus * along_x * along_z).recip();
         let bending = |depth: f64| [12.0 * KAPPA * shear_modulus / (young_pa * depth * depth), uncertainty];
-        Specimen {
+        Bulk {
             shear_per_n: [shear, uncertainty * shear],
             bending_per_m2: [bending(along_z), bending(along_x)],
             clamp_m: [clamp_m, 0.5 * uncertainty],
@@ -93,7 +93,7 @@ impl Specimen {
     /// the contact.
     pub fn unstated(farthest_m: f64) -> Self {
         let [part, sigma] = CLAMP;
-        Specimen {
+        Bulk {
             shear_per_n: SHEAR_PER_N,
             bending_per_m2: [BENDING_PER_M2; 2],
             clamp_m: [(part * farthest_m).max(NEAREST_CLAMP_M), sigma],
@@ -104,18 +104,30 @@ impl Specimen {
 /// Standard deviation of the logarithm of a ratio of specimen B to A, unless both are stated.
 const UNLIKE: f64 = 0.4;
 
-/// Start values and standard deviations of the parameters of both specimens, from what is stated of
-/// A and B; `farthest_m` is the height of the farthest point on either.
-pub fn priors([a, b]: [Option<Specimen>; 2], farthest_m: f64) -> [[f64; 2]; 2 * TERMS] {
-    let own = a.or(b).unwrap_or_else(|| Specimen::unstated(farthest_m));
+/// What is known of one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Start value.
+    pub start: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// Whether the plan states it; otherwise it is a guess.
+    pub stated: bool,
+}
+
+/// What is known of the parameters of both specimens, from what is stated of A and B; `farthest_m`
+/// is the height of the farthest point on either.
+pub fn priors([a, b]: [Option<Bulk>; 2], farthest_m: f64) -> [Prior; 2 * TERMS] {
     let logarithm = |[value, sigma]: [f64; 2]| [value.ln(), sigma];
+    let own = a.or(b).unwrap_or_else(|| Bulk::unstated(farthest_m));
     let [along_z, along_x] = own.bending_per_m2;
-    let relative = match (a, b) {
+    let of_a = [own.shear_per_n, logarithm(along_z), logarithm(along_x), logarithm(own.clamp_m)];
+    let of_b = match (a, b) {
         (Some(a), Some(b)) if a.shear_per_n[0] > 0.0 => {
-            let part = |[value, sigma]: [f64; 2]| [value, sigma / value];
+            let relative = |[value, sigma]: [f64; 2]| [value, sigma / value];
             let ratio = |[a, of_a]: [f64; 2], [b, of_b]: [f64; 2]| [(b / a).ln(), of_a.hypot(of_b)];
             [
-                ratio(part(a.shear_per_n), part(b.shear_per_n)),
+                ratio(relative(a.shear_per_n), relative(b.shear_per_n)),
                 ratio(a.bending_per_m2[0], b.bending_per_m2[0]),
                 ratio(a.bending_per_m2[1], b.bending_per_m2[1]),
                 ratio(a.clamp_m, b.clamp_m),
@@ -124,8 +136,11 @@ pub fn priors([a, b]: [Option<Specimen>; 2], farthest_m: f64) -> [[f64; 2]; 2 * 
         (Some(_), Some(_)) => [[0.0; 2]; TERMS],
         _ => [[0.0, UNLIKE]; TERMS],
     };
-    let of_a = [own.shear_per_n, logarithm(along_z), logarithm(along_x), logarithm(own.clamp_m)];
-    std::array::from_fn(|n| if n < TERMS { of_a[n] } else { relative[n - TERMS] })
+    std::array::from_fn(|n| {
+        let ([start, sigma], stated) =
+            if n < TERMS { (of_a[n], a.or(b).is_some()) } else { (of_b[n - TERMS], a.and(b).is_some()) };
+        Prior { start, sigma, stated }
+    })
 }
 
 /// A specimen's elastic shape.
@@ -135,10 +150,8 @@ pub struct Shape {
     /// For forces along z and x.
     ratios: [f64; 2],
     clamp_m: f64,
-    /// 1 on A, −1 on B.
-    side: f64,
-    /// Shear compliance over that of A.
-    ratio_to_a: f64,
+    /// On B: its shear compliance over that of A.
+    of_b: Option<f64>,
 }
 
 /// Displacement of a point beyond the rigid body's along x, y and z (rows) per newton of the
@@ -146,12 +159,12 @@ pub struct Shape {
 pub type Compliance = Matrix3<f64>;
 
 /// A displacement with its derivatives.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Deflected {
     /// The displacement.
     pub value: Compliance,
-    /// Its derivatives by the specimen's own shear compliance and logarithms.
-    pub by: [Compliance; TERMS],
+    /// Its derivatives by parameters: (index, value).
+    pub by: Vec<(usize, Compliance)>,
     /// Its derivatives by the point's coordinates.
     pub by_place: [Compliance; 3],
 }
@@ -163,53 +176,36 @@ type Section = [f64; 2];
 impl Shape {
     /// That of A from the parameters of both.
     pub fn of_a(p: &[f64]) -> Self {
-        Shape {
-            shear: p[0],
-            ratios: [p[1].exp(), p[2].exp()],
-            clamp_m: p[3].exp(),
-            side: 1.0,
-            ratio_to_a: 1.0,
-        }
+        Shape { shear: p[0], ratios: [p[1].exp(), p[2].exp()], clamp_m: p[3].exp(), of_b: None }
     }
 
     /// That of B from the parameters of both.
     pub fn of_b(p: &[f64]) -> Self {
         let Shape { shear, ratios, clamp_m, .. } = Shape::of_a(p);
         let own = &p[TERMS..];
+        let ratio = own[0].exp();
         Shape {
-            shear: shear * own[0].exp(),
+            shear: shear * ratio,
             ratios: [ratios[0] * own[1].exp(), ratios[1] * own[2].exp()],
             clamp_m: clamp_m * own[3].exp(),
-            side: -1.0,
-            ratio_to_a: own[0].exp(),
+            of_b: Some(ratio),
         }
     }
 
-    /// Derivatives by the parameters of both specimens, as (index among them, value).
-    pub fn by_parameters(&self, at: &Deflected) -> Vec<(usize, Compliance)> {
-        let mut all: Vec<(usize, Compliance)> = at.by.into_iter().enumerate().collect();
-        if self.side < 0.0 {
-            let ratio = self.ratio_to_a;
-            let own = at.by.into_iter().enumerate().map(|(n, by)| (TERMS + n, by));
-            all.extend(own);
-            all[0].1 *= ratio;
-            all[TERMS].1 *= self.shear;
-        }
-        all
-    }
-
-    /// At a point whose coordinates are relative to the contact, m.
-    pub fn at(&self, r: [f64; 3]) -> Deflected {
-        let Shape { shear: a, ratios, clamp_m, side, .. } = *self;
+    /// At a point whose coordinates are relative to the contact, m. The parameters of both specimens
+    /// are counted from `first`.
+    pub fn at(&self, r: [f64; 3], first: usize) -> Deflected {
+        let Shape { shear: a, ratios, clamp_m, of_b } = *self;
+        let side = if of_b.is_some() { -1.0 } else { 1.0 };
         let [_, y, _] = r;
         let height = side * y;
         if height <= 0.0 {
             // sections beyond the contact are not loaded
             let none = Compliance::zeros();
-            return Deflected { value: none, by: [none; TERMS], by_place: [none; 3] };
+            return Deflected { value: none, by: Vec::new(), by_place: [none; 3] };
         }
-        // the clamp takes the load over some length: the smaller of height and clamp_m, with a round
-        // corner
+        // the clamp takes the load over some length: the smaller of height and clamp_m, with a
+        // round corner
         let loaded = (height.powi(-CORNER) + clamp_m.powi(-CORNER)).powf(-1.0 / f64::from(CORNER));
         let h = side * loaded;
         let by_height = (loaded / height).powi(CORNER + 1);
@@ -226,14 +222,25 @@ impl Shape {
         let none = [[0.0; 2]; 2];
         let axial = AXIAL * a;
         let turn = value.map(|[_, turn]| turn);
+        let by_shear = displacement(r, by_shear, AXIAL * h);
+        let by_logarithms = [
+            displacement(r, [by_ratio[0], none[1]], 0.0),
+            displacement(r, [none[0], by_ratio[1]], 0.0),
+            displacement(r, scaled(by_h, by_clamp), axial * by_clamp),
+        ];
+        let numbered = |from: usize, by_first: Compliance| {
+            std::iter::once(by_first).chain(by_logarithms).enumerate().map(move |(n, by)| (from + n, by))
+        };
+        let by = match of_b {
+            None => numbered(first, by_shear).collect(),
+            // by the parameters of A, then by the logarithms of its ratios to them
+            Some(ratio) => {
+                numbered(first, by_shear * ratio).chain(numbered(first + TERMS, by_shear * a)).collect()
+            }
+        };
         Deflected {
             value: displacement(r, value, axial * h),
-            by: [
-                displacement(r, by_shear, AXIAL * h),
-                displacement(r, [by_ratio[0], none[1]], 0.0),
-                displacement(r, [none[0], by_ratio[1]], 0.0),
-                displacement(r, scaled(by_h, by_clamp), axial * by_clamp),
-            ],
+            by,
             by_place: [
                 Compliance::new(0.0, 0.0, 0.0, -turn[1], 0.0, 0.0, 0.0, 0.0, 0.0),
                 displacement(r, by_y, axial * by_height),
@@ -263,9 +270,9 @@ mod tests {
             for force in [0, 2] {
                 // the clamped section stands still: move the rigid body against its deflection
                 let mut r = [0.0, y, 0.0];
-                let along = -shape.at(r).value[(force, force)];
+                let along = -shape.at(r, 0).value[(force, force)];
                 r[force] = 0.005;
-                let turn = shape.at(r).value[(1, force)] / 0.005;
+                let turn = shape.at(r, 0).value[(1, force)] / 0.005;
                 let tip = along - turn * y;
                 // A is pushed by −F, B by F
                 let expected = -side * (a * length + b * length.powi(3) / 3.0);
@@ -284,14 +291,16 @@ mod tests {
         for (shape, side) in [(Shape::of_a as fn(&[f64]) -> Shape, 1.0), (Shape::of_b, -1.0)] {
             for height in [0.0005, 0.006, 0.014] {
                 let r = [0.004, side * height, -0.003];
-                let exact = shape(&p).at(r);
+                let exact = shape(&p).at(r, 0);
                 let mut by = [Compliance::zeros(); 2 * TERMS];
-                shape(&p).by_parameters(&exact).into_iter().for_each(|(n, own)| by[n] = own);
+                for (n, own) in &exact.by {
+                    by[*n] = *own;
+                }
                 for (n, by) in by.into_iter().enumerate() {
                     let of = |step: f64| {
                         let mut q = p;
                         q[n] += step;
-                        shape(&q).at(r).value
+                        shape(&q).at(r, 0).value
                     };
                     let step = if n == 0 { 1e-11 } else { 1e-4 };
                     near((of(step) - of(-step)) / (2.0 * step), by);
@@ -300,7 +309,7 @@ mod tests {
                     let of = |by: f64| {
                         let mut q = r;
                         q[n] += by;
-                        shape(&p).at(q).value
+                        shape(&p).at(q, 0).value
                     };
                     near((of(1e-7) - of(-1e-7)) / 2e-7, exact.by_place[n]);
                 }

@@ -138,7 +138,7 @@ fn input<'a>(cells: &'a [Cell], keep: impl Fn(&Cell) -> bool) -> Input<'a> {
         cells,
         contact_m: [0.0; 3],
         spots_m: None,
-        specimens: [Some(Specimen::RIGID); 2],
+        specimens: [Some(Bulk::RIGID); 2],
         priors,
         band_hz: BAND,
     }

@@ -16,11 +16,9 @@
 
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
-use super::elastic::Shape;
+use super::model::bulk_of_spot;
 use super::outcome::{Interval, Variances, stiffness_of};
-use super::parameters::{
-    COMPLIANCE, Cause, DELAYS, ELASTIC, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B,
-};
+use super::parameters::{COMPLIANCE, Cause, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N, Stiffness};
 use crate::C;
 use crate::band::Band;
@@ -369,14 +367,10 @@ fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3], own_b: bool) ->
         |channel: usize, seen: C| seen / ((1.0 + p[GAINS + channel]) * (-s * p[DELAYS + channel]).exp());
     // (θ × r) along z is θ_x y − θ_y x
     let tilt = |spot: usize, turn: [C; 2]| t * (turn[0] * p[SPOTS + spot + 1] - turn[1] * p[SPOTS + spot]);
-    let bulk = |shape: Shape, spot: usize| shape.at([0.0, p[SPOTS + spot], 0.0]).value[(2, 2)];
-    // per newton of F: the spot's displacement beyond the body's, and that of B's surface
-    let bulk_a = bulk(Shape::of_a(&p[ELASTIC..]), 1);
-    let (bulk_b, tip) = if own_b {
-        (bulk(Shape::of_b(&p[ELASTIC..]), 3), 0.0)
-    } else {
-        (p[TIP_B] * (1.0 + p[TIP_B + 1] * p[SPOTS + 3]), p[TIP_B])
-    };
+    // per newton of F: the spots' displacements beyond the bodies', and that of B's surface
+    let tip = if own_b { 0.0 } else { p[TIP_B] };
+    let bulk = |of_a: bool| bulk_of_spot(p, of_a, own_b).value[(2, 2)];
+    let (bulk_a, bulk_b) = (bulk(true), bulk(false) + tip);
     let z_a = displacement(0, a) - tilt(0, [u[6], u[7]]);
     let z_b = displacement(1, b) - tilt(2, [u[4], u[5]]);
     let z_arm = z_b + t * (u[0] - u[3]);

@@ -165,7 +165,7 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
         cells: cells.collect(),
         contact_m: [0.0; 3],
         spots_m: Some(SPOTS),
-        specimens: [Some(Specimen::RIGID); 2],
+        specimens: [Some(Bulk::RIGID); 2],
         priors,
         band_hz: BAND,
     }

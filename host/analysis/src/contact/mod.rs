@@ -51,7 +51,7 @@ mod solver;
 mod tests;
 
 pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
-pub use elastic::Specimen;
+pub use elastic::Bulk;
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
 };
@@ -90,7 +90,7 @@ pub struct Input<'a> {
     /// points measure the specimens.
     pub spots_m: Option<[[f64; 3]; 2]>,
     /// What the plan states of the bulk of specimens A and B; `None` if nothing.
-    pub specimens: [Option<Specimen>; 2],
+    pub specimens: [Option<Bulk>; 2],
     /// Prior knowledge.
     pub priors: ContactPriors,
     /// The band of the lines used.
@@ -99,7 +99,7 @@ pub struct Input<'a> {
 
 impl Input<'_> {
     /// Priors of the specimens' shapes.
-    fn elastic_priors(&self) -> [[f64; 2]; 2 * elastic::TERMS] {
+    fn elastic_priors(&self) -> [elastic::Prior; 2 * elastic::TERMS] {
         let on_specimen = |cell: &&ContactCell<'_>| {
             matches!(cell.point_grouping, Grouping::SpecimenA | Grouping::SpecimenB)
         };
@@ -269,12 +269,11 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
     }
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let before = blocks.clone();
-    let solution = solver::solve(&mut blocks, &parameters, sigma_per_s).or_else(|_| {
+    let solution = solver::solve(&mut blocks, &parameters, &[], sigma_per_s).or_else(|_| {
         // specimens that hardly bend do not determine the contact's stiffnesses along x and y, and
         // the search may not settle with them
-        (0..2).for_each(|axis| parameters.narrow(LATERAL + axis, 0.0));
         blocks = before;
-        solver::solve(&mut blocks, &parameters, sigma_per_s)
+        solver::solve(&mut blocks, &parameters, &[LATERAL, LATERAL + 1], sigma_per_s)
     })?;
     Ok(Fit { parameters, blocks, solution })
 }

@@ -6,13 +6,13 @@
 //! own, specimen B. Motion of a specimen is that of its surface at the contact; the rest of it
 //! deviates from that by its bending and shear, which are proportional to F (`elastic`). Without
 //! points of its own, specimen B's surface deviates from arm B in proportion to F. The contact
-//! couples the surfaces: z_A − z_B = F/(k_T + s c_T) at the contact itself,
-//! with F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y). So z_A is not an independent
+//! couples the surfaces: z_A − z_B = F/(k_T + s c_T) at the contact itself, with
+//! F = (a₀ + a₁ s) T + Σ (b₀ + b₁ s + b₂ s²) (z_B, θ_x, θ_y). So z_A is not an independent
 //! coordinate but follows from T and B's motion; on B alone, where F is the hammer's, T follows
 //! from B's motion.
 
 use super::block::{Axis, Block, BlockCell, BlockLine, ChannelRow, Group, POINT};
-use super::elastic::{Compliance, Shape};
+use super::elastic::{Compliance, Deflected, Shape};
 use super::parameters::{
     COMPLIANCE, DELAYS, ELASTIC, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, LATERAL, RETARDATION,
     SPOTS, TIP_B,
@@ -63,15 +63,6 @@ fn dot(of: &Linear, x: &DVector<C>) -> C {
     of.iter().zip(x.iter()).map(|(a, b)| a * b).sum()
 }
 
-/// Displacement of a point by the specimen's deformation, per newton of the contact's force.
-struct Bulk {
-    moved: Compliance,
-    /// Its derivatives: (parameter, value).
-    by: Vec<(usize, Compliance)>,
-    /// Its derivatives by the point's coordinates.
-    by_place: [Compliance; 3],
-}
-
 /// Displacement along `direction` by the contact's force.
 fn along(direction: [f64; 3], of: &Compliance, force: &[C; 3]) -> C {
     let part = |axis: usize| (0..3).map(|row| direction[row] * of[(row, axis)]).sum::<f64>();
@@ -86,6 +77,26 @@ fn turned(translation: &Linear, theta: [usize; 3], r: [f64; 3], axis: usize) -> 
     moved[theta[next]] += r[last];
     moved[theta[last]] -= r[next];
     moved
+}
+
+/// Displacement of spot A or B per newton of the contact's force, beyond that of its surface at the
+/// contact. If specimen B has no points of its own, its surface turns relative to arm B.
+pub fn bulk_of_spot(p: &[f64], of_a: bool, points_on_b: bool) -> Deflected {
+    let own = &p[ELASTIC..];
+    if of_a {
+        return Shape::of_a(own).at([p[SPOTS], p[SPOTS + 1], 0.0], ELASTIC);
+    }
+    let (x, y) = (p[SPOTS + 2], p[SPOTS + 3]);
+    if points_on_b {
+        return Shape::of_b(own).at([x, y, 0.0], ELASTIC);
+    }
+    let (tip, turn) = (p[TIP_B], p[TIP_B + 1]);
+    let along_z = |value: f64| Compliance::from_diagonal(&[0.0, 0.0, value].into());
+    Deflected {
+        value: along_z(tip * turn * y),
+        by: vec![(TIP_B, along_z(turn * y)), (TIP_B + 1, along_z(tip * y))],
+        by_place: [Compliance::zeros(), along_z(tip * turn), Compliance::zeros()],
+    }
 }
 
 impl<'a> LineModel<'a> {
@@ -213,32 +224,18 @@ impl<'a> LineModel<'a> {
 
     /// Displacement of a cell's point per newton of the contact's force, beyond that of the surface
     /// at the contact; none on arm B.
-    fn bulk(&self, cell: &BlockCell) -> Option<Bulk> {
-        (cell.group != Group::ArmB).then(|| self.bulk_at(cell.group == Group::SpecimenA, self.position(cell)))
-    }
-
-    /// The same for a spot. Without points on B, its surface turns relative to arm B.
-    fn bulk_of_spot(&self, of_a: bool) -> Bulk {
-        let (_, _, place) = self.spot(of_a);
-        if of_a || self.block.specimen_b().is_some() {
-            return self.bulk_at(of_a, place);
-        }
-        let (tip, turn) = (self.p[TIP_B], self.p[TIP_B + 1]);
-        let y = place[1];
-        let along_z = |value: f64| Compliance::from_diagonal(&[0.0, 0.0, value].into());
-        Bulk {
-            moved: along_z(tip * turn * y),
-            by: vec![(TIP_B, along_z(turn * y)), (TIP_B + 1, along_z(tip * y))],
-            by_place: [Compliance::zeros(), along_z(tip * turn), Compliance::zeros()],
-        }
-    }
-
-    fn bulk_at(&self, of_a: bool, r: [f64; 3]) -> Bulk {
+    fn bulk(&self, cell: &BlockCell) -> Option<Deflected> {
         let own = &self.p[ELASTIC..];
-        let shape = if of_a { Shape::of_a(own) } else { Shape::of_b(own) };
-        let at = shape.at(r);
-        let by = shape.by_parameters(&at).into_iter().map(|(n, by)| (ELASTIC + n, by));
-        Bulk { moved: at.value, by: by.collect(), by_place: at.by_place }
+        let shape = match cell.group {
+            Group::ArmB => return None,
+            Group::SpecimenA => Shape::of_a(own),
+            Group::SpecimenB => Shape::of_b(own),
+        };
+        Some(shape.at(self.position(cell), ELASTIC))
+    }
+
+    fn bulk_of_spot(&self, of_a: bool) -> Deflected {
+        bulk_of_spot(self.p, of_a, self.block.specimen_b().is_some())
     }
 
     /// The map, with one row for each of the block's rows, and the rows' values without any motion.
@@ -256,7 +253,7 @@ impl<'a> LineModel<'a> {
             1 | 2 => {
                 let (z, theta, place) = self.spot(channel == 2);
                 let factor = self.of_spot(2 - channel);
-                let bulk = factor * self.bulk_of_spot(channel == 2).moved[(2, 2)];
+                let bulk = factor * self.bulk_of_spot(channel == 2).value[(2, 2)];
                 sum(&[(factor, &turned(&z, theta, place, 2)), (bulk, &self.force[2])])
             }
             _ => {
@@ -268,7 +265,7 @@ impl<'a> LineModel<'a> {
                 let mut terms: Vec<(C, &Linear)> =
                     parts.into_iter().zip(&moved).filter(|(part, _)| *part != C::default()).collect();
                 if let Some(bulk) = self.bulk(cell) {
-                    let per_newton = Vector3::from(self.direction(axis)).transpose() * bulk.moved;
+                    let per_newton = Vector3::from(self.direction(axis)).transpose() * bulk.value;
                     terms.extend(per_newton.iter().map(|part| factor * part).zip(&self.force));
                 }
                 sum(&terms)
@@ -340,7 +337,7 @@ impl<'a> LineModel<'a> {
                     if assembled {
                         let by = bulk.by.iter();
                         own.extend(by.map(|(at, by)| (local(*at), factor * force * by[(2, 2)])));
-                        of_z(of_a, factor, factor * bulk.moved[(2, 2)], &mut own);
+                        of_z(of_a, factor, factor * bulk.value[(2, 2)], &mut own);
                     }
                 }
                 channel => {
@@ -369,7 +366,7 @@ impl<'a> LineModel<'a> {
                             let mut seen: C =
                                 across.iter().zip(&moved).map(|(part, of)| part * dot(of, x)).sum();
                             if let Some(bulk) = &bulk {
-                                seen += along(*across, &bulk.moved, &forces);
+                                seen += along(*across, &bulk.value, &forces);
                             }
                             own.push((local(at + k), factor * seen));
                         }
@@ -381,11 +378,11 @@ impl<'a> LineModel<'a> {
                         for axis in 0..2 {
                             let mut own_force = [C::default(); 3];
                             own_force[axis] = forces[axis];
-                            own.push((local(LATERAL + axis), factor * along(d, &bulk.moved, &own_force)));
+                            own.push((local(LATERAL + axis), factor * along(d, &bulk.value, &own_force)));
                         }
                         let of_a = cell.group == Group::SpecimenA;
                         let of_surface = if of_a { factor * d[2] } else { C::default() };
-                        let per_newton: f64 = (0..3).map(|row| d[row] * bulk.moved[(row, 2)]).sum();
+                        let per_newton: f64 = (0..3).map(|row| d[row] * bulk.value[(row, 2)]).sum();
                         of_z(of_a, of_surface, factor * per_newton, &mut own);
                     }
                 }

@@ -355,12 +355,12 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
 }
 
 /// Tests every assumption. Aims are not candidates for the largest deviation: on the moving mass
-/// they absorb the effect of shifts of the hammer. Neither are the specimens' compliances, which are
-/// a guess unless the plan states them.
+/// they absorb the effect of shifts of the hammer. Neither are guesses.
 fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
-    let stated = parameters.all().iter().zip(&solution.p).filter(|(own, _)| {
-        !matches!(own.cause, Cause::Noise | Cause::Aim | Cause::Bending) && own.sigma > 0.0
-    });
+    let stated =
+        parameters.all().iter().zip(&solution.p).filter(|(own, _)| {
+            own.stated && !matches!(own.cause, Cause::Noise | Cause::Aim) && own.sigma > 0.0
+        });
     let farthest = stated
         .map(|(own, p)| (own, own.deviations(*p)))
         .max_by(|(_, a), (_, b)| a.total_cmp(b))

@@ -70,8 +70,8 @@ const SPECIMEN_M: f64 = 0.03;
 /// Upper bound of the compliance between arm B and specimen B's surface, m/N: a clamp of 30 N/µm.
 const TIP_M_PER_N: f64 = 3e-8;
 /// Change of the displacement of specimen B's material with the height over that of its surface,
-/// 1/m, and the standard deviation: 1.5/L for a bent cantilever of the length L, 1/L for shear or if
-/// it turns in its clamp, 0 if the clamp or arm B gives along z.
+/// 1/m, and the standard deviation: 1.5/L for a bent cantilever of the length L, 1/L for shear or
+/// if it turns in its clamp, 0 if the clamp or arm B gives along z.
 const TURN_PER_M: [f64; 2] = [110.0, 50.0];
 
 /// Stiffnesses of a contact across the sliding direction and normal to it, N/m, and the standard
@@ -91,6 +91,9 @@ pub struct Parameter {
     pub sigma: f64,
     /// The cause in the budget.
     pub cause: Cause,
+    /// Whether the prior is stated, so that a value far from it is a contradiction; otherwise it is
+    /// a guess.
+    pub stated: bool,
     /// For the z component of a hit: that of the nominal direction, and the standard deviation of
     /// the hammer's tilt, rad.
     pub tilted: Option<[f64; 2]>,
@@ -99,7 +102,7 @@ pub struct Parameter {
 impl Parameter {
     /// A parameter with a Gaussian prior.
     pub fn new(name: String, start: f64, sigma: f64, cause: Cause) -> Self {
-        Parameter { name, start, sigma, cause, tilted: None }
+        Parameter { name, start, sigma, cause, stated: true, tilted: None }
     }
 
     /// Distance of `value` from its stated value, in standard deviations. For the hammer it is
@@ -124,7 +127,7 @@ impl Parameters {
         priors: &ContactPriors,
         compliance_m_per_n: f64,
         spots_m: [[f64; 3]; 2],
-        specimens: [[f64; 2]; 2 * elastic::TERMS],
+        specimens: [elastic::Prior; 2 * elastic::TERMS],
     ) -> Self {
         let named = |name: &str, start, sigma, cause| Parameter::new(name.to_owned(), start, sigma, cause);
         let free = |name: &str, start| named(name, start, f64::INFINITY, Cause::Noise);
@@ -135,15 +138,19 @@ impl Parameters {
         for lever in [1.0, SPECIMEN_M, SPECIMEN_M] {
             all.push(named("specimen B's inertia", 0.0, SPECIMEN_KG * lever, Cause::Noise));
         }
-        for (what, [start, sigma]) in ELASTIC_NAMES.iter().zip(specimens) {
-            all.push(named(what, start, sigma, Cause::Bending));
+        for (what, own) in ELASTIC_NAMES.iter().zip(specimens) {
+            let known = named(what, own.start, own.sigma, Cause::Bending);
+            all.push(Parameter { stated: own.stated, ..known });
         }
-        all.push(named("the compliance of specimen B and its clamp", 0.0, TIP_M_PER_N, Cause::Bending));
+        let guess = |name: &str, start, sigma| Parameter {
+            stated: false,
+            ..named(name, start, sigma, Cause::Bending)
+        };
+        all.push(guess("the compliance of specimen B and its clamp", 0.0, TIP_M_PER_N));
         let [turn, sigma] = TURN_PER_M;
-        all.push(named("the rotation of specimen B's surface", turn, sigma, Cause::Bending));
+        all.push(guess("the rotation of specimen B's surface", turn, sigma));
         for (axis, stiffness) in ["x", "y"].into_iter().zip(LATERAL_N_PER_M) {
-            let name = format!("the contact's stiffness along {axis}");
-            all.push(named(&name, stiffness.ln(), LATERAL_SPREAD, Cause::Bending));
+            all.push(guess(&format!("the contact's stiffness along {axis}"), stiffness.ln(), LATERAL_SPREAD));
         }
         for (spot, side) in spots_m.into_iter().zip(["A", "B"]) {
             for (axis, of) in ["x", "y"].into_iter().enumerate() {
@@ -195,6 +202,7 @@ pub fn along_z(impact: &str, direction: [f64; 3], tilt_rad: f64) -> Parameter {
         start: z * (1.0 - tilt_rad * tilt_rad),
         sigma: (tilt_rad * across).hypot(second),
         cause: Cause::HammerTilt,
+        stated: true,
         tilted: Some([z, tilt_rad]),
     }
 }

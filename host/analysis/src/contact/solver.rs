@@ -66,7 +66,8 @@ struct Posterior<'a> {
 }
 
 /// Finds the most likely parameters. Residuals of a cell beyond its noise are then counted as noise
-/// of that cell.
+/// of that cell. The search leaves the `held` parameters at their start values, but what they may
+/// deviate from these counts in the uncertainty.
 ///
 /// # Errors
 /// [`ContactError::NotIdentified`] if the rows do not determine the motion or the parameters, or no
@@ -74,10 +75,17 @@ struct Posterior<'a> {
 pub fn solve(
     blocks: &mut [Block],
     parameters: &Parameters,
+    held: &[usize],
     sigma_per_s: f64,
 ) -> Result<Solution, ContactError> {
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
-    let (mut here, mut settled) = Posterior { blocks, parameters, shared }.settle(parameters.start())?;
+    let mut searched = parameters.clone();
+    for at in held {
+        searched.narrow(*at, 0.0);
+    }
+    let settle =
+        |blocks: &[Block], p: Vec<f64>| Posterior { blocks, parameters: &searched, shared }.settle(p);
+    let (mut here, mut settled) = settle(blocks, parameters.start())?;
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
@@ -85,7 +93,7 @@ pub fn solve(
         if !widen(blocks, &left) {
             break;
         }
-        (here, settled) = Posterior { blocks, parameters, shared }.settle(here.p)?;
+        (here, settled) = settle(blocks, here.p)?;
     }
     if !settled {
         return Err(ContactError::NotIdentified("the fit of the contact does not converge".into()));

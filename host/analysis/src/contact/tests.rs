@@ -221,7 +221,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
         cells: cells.iter().map(of).collect(),
         contact_m: [0.0; 3],
         spots_m: Some(SPOTS),
-        specimens: [Some(Specimen::RIGID); 2],
+        specimens: [Some(Bulk::RIGID); 2],
         priors,
         band_hz: BAND,
     }
@@ -253,16 +253,7 @@ fn without_noise_the_contact_is_found_to_a_thousandth() {
 
 #[test]
 fn a_spot_that_is_not_where_it_is_said_to_be_is_inside_the_interval() {
-    let world = World {
-        noise_m_per_s: 5e-7,
-        spot_m: 4e-5,
-        misplaced_m: 0.0,
-        bends_hz: None,
-        seed: 1,
-        bulk: [0.0; 2],
-        tip: [0.0; 2],
-    };
-    let cells = measured(world);
+    let cells = measured(World { noise_m_per_s: 5e-7, spot_m: 4e-5, ..QUIET });
     let found = stiffness(&input(&cells)).expect("all is there");
     let [low, high] = found.k_t_n_per_m.ci95;
     assert!(low < K && K < high && high - low < 0.2 * K, "{found:?}");
@@ -273,16 +264,7 @@ fn the_interval_is_what_repeated_measurements_scatter_by() {
     // noise of about a fifth of the motion at each line, so that the motion itself is uncertain
     let deviations: Vec<f64> = (0..24)
         .map(|seed| {
-            let world = World {
-                noise_m_per_s: 2e-6,
-                spot_m: 0.0,
-                misplaced_m: 0.0,
-                bends_hz: None,
-                seed,
-                bulk: [0.0; 2],
-                tip: [0.0; 2],
-            };
-            let cells = measured(world);
+            let cells = measured(World { noise_m_per_s: 2e-6, seed, ..QUIET });
             let mut input = input(&cells);
             input.priors.spot_m = 1e-7;
             let found = stiffness(&input).expect("all is there");
@@ -313,6 +295,32 @@ fn specimens_that_bend_keep_the_contact_within_its_interval() {
     let cells = measured(World { noise_m_per_s: 1e-7, bulk: [7e-7, 0.04], ..QUIET });
     let rigid = stiffness(&input(&cells)).expect("all is there");
     assert!(rigid.k_t_n_per_m.ci95[1] < K, "{rigid:?}");
+}
+
+#[test]
+fn a_stated_bulk_that_the_points_contradict_is_doubted() {
+    let cells = measured(World { noise_m_per_s: 1e-7, bulk: [2.4e-7, 0.014], ..QUIET });
+    // stated ten times too stiff
+    let bending = [5.8e4, 0.1];
+    let stiff = Bulk { shear_per_n: [2.4e-8, 2.4e-9], bending_per_m2: [bending; 2], clamp_m: [0.012, 0.05] };
+    let found = stiffness(&Input { specimens: [Some(stiff), None], ..input(&cells) }).expect("all is there");
+    assert!(found.doubts.contains(&Doubt::Stated), "{:?}", found.diagnosis);
+}
+
+#[test]
+fn what_the_search_holds_counts_in_the_interval() {
+    let cells = measured(World { noise_m_per_s: 1e-7, bulk: [2.4e-7, 0.014], ..QUIET });
+    let input = Input { specimens: [None; 2], ..input(&cells) };
+    let Fit { parameters, mut blocks, solution } = fit(&input).expect("all is there");
+    let lateral = [parameters::LATERAL, parameters::LATERAL + 1];
+    let held = solver::solve(&mut blocks, &parameters, &lateral, SIGMA_PER_S).expect("a minimum");
+    let start = parameters.start();
+    assert!(lateral.iter().all(|at| (held.p[*at] - start[*at]).abs() < 1e-6));
+    assert!(lateral.iter().all(|at| (solution.p[*at] - start[*at]).abs() > 0.01));
+    let sigma =
+        |own: &Solution| own.certainty.covariance[(parameters::COMPLIANCE, parameters::COMPLIANCE)].sqrt();
+    // the same signals and priors, at another place
+    assert!((sigma(&held) / sigma(&solution) - 1.0).abs() < 0.3, "{} {}", sigma(&held), sigma(&solution));
 }
 
 #[test]

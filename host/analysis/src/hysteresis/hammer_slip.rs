@@ -40,8 +40,8 @@ const NO_ACCIDENT: f64 = 1e-3;
 /// of the last hit's motion is left, most of it in the mode that rings longest. The runner strikes
 /// the softer of two forces first in every second cell of an impact, so that a third of the change
 /// that this makes follows the force. Where the softer hit always comes second, as in records of
-/// other programs, all of it does: on simulated rigs without slip up to 0.6 %, and 1.4 % with a fifth
-/// of the damping.
+/// other programs, all of it does: on simulated rigs without slip up to 0.6 %, and 1.4 % with a
+/// fifth of the damping.
 const LEFT_BEHIND: f64 = 0.015;
 
 /// Standard deviations above which a single change is not scatter.
@@ -524,7 +524,8 @@ mod tests {
         // in a fixed order it would be taken for slip
         assert_eq!(on_what_is_left(0.0, |_| false).found(), Some(true));
         let HammerSlip::Slips(scaling) = on_what_is_left(0.04, every_second) else { panic!("it slips") };
-        // a quarter of what is left follows the force where three of seven cells begin with the softer
+        // a quarter of what is left follows the force where three of seven cells begin with the
+        // softer one
         assert!((scaling.change_per_force - 0.04).abs() < 0.012, "{scaling:?}");
     }
 

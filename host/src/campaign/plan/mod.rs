@@ -6,7 +6,7 @@
 //! (`[priors]`). Unknown fields are refused, and every error names file, line and field. Lengths
 //! are in m, forces in N, times in s unless a name states otherwise.
 
-use crate::contact::{ContactPriors, Specimen};
+use crate::contact::{Bulk, ContactPriors};
 use crate::structure::Structure;
 use faults::Faults;
 use jointrig_protocol::request::Configuration;
@@ -288,10 +288,10 @@ pub struct SpecimenPlan {
 
 impl SpecimenPlan {
     /// Its bulk as the analysis takes it.
-    pub fn known(&self) -> Specimen {
+    pub fn known(&self) -> Bulk {
         let poisson = self.poisson.unwrap_or(0.3);
         let uncertainty = self.uncertainty.unwrap_or(0.2);
-        Specimen::beam(self.section_m, self.young_pa, poisson, self.clamp_m, uncertainty)
+        Bulk::beam(self.section_m, self.young_pa, poisson, self.clamp_m, uncertainty)
     }
 }
 
@@ -339,7 +339,7 @@ pub fn configuration_named(name: &str) -> Option<Configuration> {
 
 impl Plan {
     /// What the plan states of the bulk of specimens A and B.
-    pub fn known_specimens(&self) -> [Option<Specimen>; 2] {
+    pub fn known_specimens(&self) -> [Option<Bulk>; 2] {
         let stated = self.specimens.as_ref().map_or_else(SpecimensPlan::default, |own| *own.get_ref());
         stated.both().map(|(_, own)| own.as_ref().map(SpecimenPlan::known))
     }

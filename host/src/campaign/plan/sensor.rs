@@ -108,9 +108,9 @@ impl Plan {
             .collect()
     }
 
-    /// The same channels with the vibrometers on the specimens positive along the sliding direction:
-    /// the scale of one that the plan's sensor `LDV_A` or `LDV_B` says looks against it has the
-    /// opposite sign.
+    /// The same channels with the vibrometers on the specimens positive along the sliding
+    /// direction: if the plan's sensor `LDV_A` or `LDV_B` looks against it, the scale of that
+    /// channel has the opposite sign.
     pub fn along_sliding(&self, mut map: ChannelMap) -> ChannelMap {
         for channel in &mut map.channels {
             let spot = SPOTS.into_iter().find(|(role, _)| *role == channel.role);

@@ -441,8 +441,9 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Creates a meter for these channels ([`Plan::along_sliding`]); with an open-loop drive, it measures the specimens'
-    /// relative displacement to determine whether the structure has settled.
+    /// Creates a meter for these channels ([`Plan::along_sliding`]); with an open-loop drive, it
+    /// measures the specimens' relative displacement to determine whether the structure has
+    /// settled.
     pub fn new(channels: &ChannelMap, held: Held, frequency_hz: f64) -> Self {
         let omega = TAU * frequency_hz;
         let term = |role: Role, gain: f64| {
@@ -501,8 +502,8 @@ impl Meter {
 #[error("its session has no {0}")]
 pub struct Unusable(&'static str);
 
-/// v_A, v_B and the load cells' sum, aligned in time; `channels` are those of [`Plan::along_sliding`],
-/// and `cells` [`Plan::load_cells`].
+/// v_A, v_B and the load cells' sum, aligned in time; `channels` are those of
+/// [`Plan::along_sliding`], and `cells` [`Plan::load_cells`].
 ///
 /// # Errors
 /// A channel is missing.
