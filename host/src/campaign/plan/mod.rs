@@ -453,6 +453,10 @@ pub struct PriorsPlan {
     pub hammer_angle_rad: Option<f64>,
     /// The spots next to the contact, m along each axis.
     pub spot_m: Option<f64>,
+    /// The contact's centre across the sliding direction, m along x.
+    pub contact_across_m: Option<f64>,
+    /// The height of the contact's faces, m along y.
+    pub contact_height_m: Option<f64>,
     /// Points on the specimens, m along each axis.
     pub specimen_point_m: Option<f64>,
     /// Gains of the vibrometers, relative.
@@ -475,6 +479,8 @@ impl PriorsPlan {
             (self.aim_m, &mut known.positions.aim_m),
             (self.hammer_angle_rad, &mut known.positions.hammer_angle_rad),
             (self.spot_m, &mut known.spot_m),
+            (self.contact_across_m, &mut known.contact_across_m),
+            (self.contact_height_m, &mut known.contact_height_m),
             (self.specimen_point_m, &mut known.specimen_point_m),
             (self.gain, &mut known.gain),
             (self.hammer_gain, &mut known.hammer_gain),
@@ -489,12 +495,14 @@ impl PriorsPlan {
     }
 
     /// The stated values, by name.
-    pub fn stated(&self) -> [(&'static str, Option<f64>); 9] {
+    pub fn stated(&self) -> [(&'static str, Option<f64>); 11] {
         [
             ("position_m", self.position_m),
             ("aim_m", self.aim_m),
             ("hammer_angle_rad", self.hammer_angle_rad),
             ("spot_m", self.spot_m),
+            ("contact_across_m", self.contact_across_m),
+            ("contact_height_m", self.contact_height_m),
             ("specimen_point_m", self.specimen_point_m),
             ("gain", self.gain),
             ("hammer_gain", self.hammer_gain),

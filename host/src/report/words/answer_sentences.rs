@@ -68,6 +68,7 @@ fn of_cause(cause: Cause) -> &'static str {
     match cause {
         Cause::Noise => "noise",
         Cause::Spots => "the positions of the spots next to the contact",
+        Cause::Centre => "the position of the contact's centre",
         Cause::SpecimenPoints => "the positions of the points on the specimen",
         Cause::ArmPoints => "the positions of the points on arm B",
         Cause::Aim => "the aim of the hits in each cell",
