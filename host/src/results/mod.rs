@@ -9,7 +9,7 @@
 //! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured.
 
 use crate::campaign::store::SimulatedTruth;
-use crate::contact::{Diagnosis, Doubt, Interval, OfFrequency};
+use crate::contact::{Contradiction, Diagnosis, Doubt, Interval, OfFrequency};
 use crate::substructuring::Band;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -202,6 +202,9 @@ pub struct ContactAnswer {
     /// How well the assumptions are satisfied.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Diagnosis>,
+    /// Stated quantities that the data contradict; the interval allows for their errors.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub contradictions: Vec<Contradiction>,
     /// Assumptions that are violated; then no k_T is reported.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub doubts: Vec<Doubt>,

@@ -28,6 +28,7 @@
 //! - `model`: the signals of a line as a linear map of the motion, and its elimination
 //! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell
 //!   beyond its noise
+//! - `contradictions`: stated quantities that the data contradict
 //! - `outcome`: the result and the sources of its uncertainty, tests of the assumptions, and the
 //!   band in which the bodies are rigid
 //! - `driven`: the rotation of the bodies while the shaker runs
@@ -36,6 +37,7 @@
 use std::f64::consts::TAU;
 
 mod block;
+mod contradictions;
 mod driven;
 mod elastic;
 #[cfg(test)]
@@ -51,6 +53,7 @@ mod solver;
 mod tests;
 
 pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
+pub use contradictions::Contradiction;
 pub use elastic::Bulk;
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
@@ -61,6 +64,7 @@ pub use parameters::{Cause, ContactPriors};
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
 use block::{Block, Group, POINT, blocks};
+use contradictions::Changes;
 use nalgebra::DVector;
 use outcome::{Variances, of_sum, trusted};
 use parameters::{FORM, LATERAL, Parameters, TIP_B};
@@ -212,11 +216,20 @@ impl Known {
 /// As [`stiffness`].
 pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
     let mut input = input.clone();
+    let (parameters, blocks) = prepared(&input)?;
+    let exchanged = Changes::of_exchanged(&blocks, parameters.all());
     loop {
-        let fit = fit(&input)?;
+        let (fit, changes) = contradictions::resolved(&exchanged, |changes| fit(&input, changes))?;
         let band_hz = trusted(&fit.blocks, &fit.solution.bins, input.band_hz);
         if band_hz == input.band_hz {
-            return fit.told(&input);
+            // with wide priors the data may not determine the contact: then it is the fit with the
+            // stated priors that is doubted
+            return fit.told(&input, &changes).or_else(|error| {
+                if changes == exchanged {
+                    return Err(error);
+                }
+                self::fit(&input, &exchanged)?.told(&input, &exchanged)
+            });
         }
         // lines at the ends that contradict the model biased this fit: the next fit judges again
         input.band_hz = band_hz;
@@ -231,16 +244,17 @@ struct Fit {
 }
 
 impl Fit {
-    fn told(self, input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
-        let Fit { parameters, blocks, solution } = self;
-        let found = outcome::of(input, &blocks, &parameters, &solution)?;
+    fn told(self, input: &Input<'_>, changes: &Changes) -> Result<(Stiffness, Known), ContactError> {
+        let found = outcome::of(input, &self, changes)?;
+        let Fit { parameters, solution, .. } = self;
         let Solution { p, certainty, chi_square, .. } = solution;
         let (misfit, hammer_gain) = (chi_square.max(1.0), input.priors.hammer_gain);
         Ok((found, Known { p, parameters, certainty, misfit, hammer_gain }))
     }
 }
 
-fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
+/// The parameters with their stated priors, and the measured signals.
+fn prepared(input: &Input<'_>) -> Result<(Parameters, Vec<Block>), ContactError> {
     let spots = input.spots_from_contact();
     if spots.is_none() && input.cells.iter().any(ContactCell::has_spots) {
         return Err(ContactError::NoSpots);
@@ -248,7 +262,7 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
     // without spots no signal depends on their positions
     let mut parameters =
         Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default(), input.elastic_priors());
-    let mut blocks = blocks(input, &mut parameters)?;
+    let blocks = blocks(input, &mut parameters)?;
     if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
         return Err(ContactError::NoForce);
     }
@@ -267,6 +281,12 @@ fn fit(input: &Input<'_>) -> Result<Fit, ContactError> {
         // no signal separates it from the contact
         parameters.narrow(TIP_B, 0.0);
     }
+    Ok((parameters, blocks))
+}
+
+fn fit(input: &Input<'_>, changes: &Changes) -> Result<Fit, ContactError> {
+    let (mut parameters, mut blocks) = prepared(input)?;
+    changes.apply(parameters.all_mut());
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
     let before = blocks.clone();
     let solution = solver::solve(&mut blocks, &parameters, &[], sigma_per_s).or_else(|_| {

@@ -10,9 +10,10 @@
 //! and stays a doubt.
 
 use super::block::Block;
+use super::contradictions::{self, Changes, Contradiction};
 use super::parameters::{COMPLIANCE, Cause, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
-use super::{ContactError, Input};
+use super::{ContactError, Fit, Input};
 use crate::band::Band;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::substructuring::geometry::Grouping;
@@ -50,22 +51,21 @@ pub struct Stiffness {
     pub of_frequency: Vec<OfFrequency>,
     /// Tests of the assumptions.
     pub diagnosis: Diagnosis,
+    /// Stated quantities that the data contradict. Their priors are widened, so that the interval
+    /// contains their errors.
+    pub contradictions: Vec<Contradiction>,
     /// The assumptions that do not hold.
     pub doubts: Vec<Doubt>,
     /// χ² per degree of freedom over all signals.
     pub chi_square: f64,
 }
 
-/// Assembles the result.
+/// Assembles the result of a fit with these changes of the priors.
 ///
 /// # Errors
 /// [`ContactError::NotIdentified`] if the compliance cannot be distinguished from zero.
-pub fn of(
-    input: &Input<'_>,
-    blocks: &[Block],
-    parameters: &Parameters,
-    solution: &Solution,
-) -> Result<Stiffness, ContactError> {
+pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, ContactError> {
+    let Fit { parameters, blocks, solution } = fit;
     let compliance = solution.p[COMPLIANCE];
     let covariance = &solution.certainty.covariance;
     let misfit = solution.chi_square.max(1.0);
@@ -86,7 +86,10 @@ pub fn of(
     let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_gain).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
-    let diagnosis = diagnose(blocks, parameters, solution);
+    let mut diagnosis = diagnose(blocks, parameters, solution);
+    if let Some(contradictions::Worst { what, deviations, .. }) = contradictions::worst(fit) {
+        diagnosis.farthest = Some(Farthest { what, deviations });
+    }
     Ok(Stiffness {
         k_t_n_per_m: k_t,
         c_t_n_s_per_m: c_t,
@@ -95,7 +98,8 @@ pub fn of(
         budget,
         includes_specimen_b: input.includes_specimen_b(),
         of_frequency: of_frequency(blocks, solution, compliance),
-        doubts: diagnosis.doubts(),
+        contradictions: changes.contradictions(fit),
+        doubts: diagnosis.doubts(contradictions::remain(fit)),
         diagnosis,
         chi_square: solution.chi_square,
     })
@@ -385,13 +389,14 @@ fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> D
 }
 
 impl Diagnosis {
-    /// The assumptions that do not hold.
-    pub fn doubts(&self) -> Vec<Doubt> {
+    /// The assumptions that do not hold; `contradicted` states whether the data contradict something
+    /// stated.
+    fn doubts(&self, contradicted: bool) -> Vec<Doubt> {
         let left = [self.calibration, self.specimen_a, self.spots];
         let contradicting =
             Signals::ALL.into_iter().zip(left).filter(|(signals, left)| signals.contradict(*left));
         let mut all: Vec<Doubt> = contradicting.map(|(signals, _)| signals.doubt()).collect();
-        if self.farthest.as_ref().is_some_and(|one| one.deviations > BEYOND) {
+        if contradicted || self.farthest.as_ref().is_some_and(|one| one.deviations > BEYOND) {
             all.push(Doubt::Stated);
         }
         if self.flatness_chi_square > CONTRADICTED {

@@ -266,7 +266,7 @@ fn the_interval_is_what_repeated_measurements_scatter_by() {
         .map(|seed| {
             let cells = measured(World { noise_m_per_s: 2e-6, seed, ..QUIET });
             let mut input = input(&cells);
-            input.priors.spot_m = 1e-7;
+            input.priors = ContactPriors { spot_m: 1e-7, contact_height_m: 1e-7, ..input.priors };
             let found = stiffness(&input).expect("all is there");
             let [low, high] = found.k_t_n_per_m.ci95;
             let sigma = (low.recip() - high.recip()) / (2.0 * 1.96);
@@ -311,7 +311,7 @@ fn a_stated_bulk_that_the_points_contradict_is_doubted() {
 fn what_the_search_holds_counts_in_the_interval() {
     let cells = measured(World { noise_m_per_s: 1e-7, bulk: [2.4e-7, 0.014], ..QUIET });
     let input = Input { specimens: [None; 2], ..input(&cells) };
-    let Fit { parameters, mut blocks, solution } = fit(&input).expect("all is there");
+    let Fit { parameters, mut blocks, solution } = fit(&input, &Changes::default()).expect("all is there");
     let lateral = [parameters::LATERAL, parameters::LATERAL + 1];
     let held = solver::solve(&mut blocks, &parameters, &lateral, SIGMA_PER_S).expect("a minimum");
     let start = parameters.start();
@@ -328,7 +328,7 @@ fn a_search_rests_when_all_parameters_do_and_not_the_compliance_alone() {
     let cells = measured(World { noise_m_per_s: 5e-7, ..QUIET });
     let mut input = input(&cells);
     input.priors = ContactPriors { skew_s: 2e-6, gain: 5e-3, ..input.priors };
-    let Fit { parameters, blocks, solution } = fit(&input).expect("all is there");
+    let Fit { parameters, blocks, solution } = fit(&input, &Changes::default()).expect("all is there");
     let sigma = |at: usize| solution.certainty.covariance[(at, at)].sqrt();
     // the load cells' gain and delay, and the spot on A
     for at in [parameters::FORM, parameters::FORM + 1, parameters::SPOTS] {
@@ -344,12 +344,64 @@ fn a_search_rests_when_all_parameters_do_and_not_the_compliance_alone() {
 }
 
 #[test]
-fn a_point_that_is_millimetres_off_is_doubted() {
-    let cells = measured(World { misplaced_m: 4e-3, ..QUIET });
-    let found = stiffness(&input(&cells)).expect("a fit, if a bad one");
-    assert!(found.doubts.contains(&Doubt::SpecimenA), "{:?}", found.diagnosis);
-    // the point gets less weight, and the other five suffice
-    assert!((found.k_t_n_per_m.mean / K - 1.0).abs() < 0.01, "{found:?}");
+fn a_point_that_is_millimetres_off_is_named_and_left_to_the_data() {
+    let cells = measured(World { misplaced_m: 4e-3, noise_m_per_s: 1e-8, ..QUIET });
+    let mut input = input(&cells);
+    input.priors.specimen_point_m = 3e-4;
+    let found = stiffness(&input).expect("the other points determine the motion");
+    let [one] = &found.contradictions[..] else { panic!("{:?}", found.contradictions) };
+    assert_eq!((one.what.as_str(), one.cause), ("point 4", Cause::SpecimenPoints));
+    let off = one.off.iter().map(|[off, _]| off * off).sum::<f64>().sqrt();
+    assert!((off - 4e-3).abs() < 2e-4, "{one:?}");
+    assert!(found.doubts.is_empty(), "{:?}", found.diagnosis);
+    let [low, high] = found.k_t_n_per_m.ci95;
+    assert!(low < K && K < high && high - low < 0.2 * K, "{found:?}");
+}
+
+#[test]
+fn exchanged_points_are_named_and_what_is_stated_truly_is_not() {
+    let cells = measured(World { noise_m_per_s: 1e-7, ..QUIET });
+    let mut input = input(&cells);
+    input.priors.specimen_point_m = 3e-4;
+    let found = stiffness(&input).expect("all is there");
+    assert!(found.contradictions.is_empty(), "{:?}", found.contradictions);
+    for cell in &mut input.cells {
+        let at = NAMES.iter().position(|name| *name == cell.point);
+        match at {
+            Some(4) => cell.point_m = SPECIMEN[4],
+            Some(7) => cell.point_m = SPECIMEN[1],
+            _ => {}
+        }
+    }
+    let exchanged = stiffness(&input).expect("the signals are the same");
+    let [one] = &exchanged.contradictions[..] else { panic!("{:?}", exchanged.contradictions) };
+    let mut both = [Some(one.what.clone()), one.swapped_with.clone()];
+    both.sort();
+    assert_eq!(both, [NAMES[4], NAMES[7]].map(|name| Some(format!("point {name}"))));
+    // the same positions as before
+    assert!((exchanged.k_t_n_per_m.mean / found.k_t_n_per_m.mean - 1.0).abs() < 1e-6, "{exchanged:?}");
+}
+
+#[test]
+fn points_known_worse_than_stated_widen_the_interval() {
+    let cells = measured(World { noise_m_per_s: 1e-8, ..QUIET });
+    let mut input = input(&cells);
+    input.priors.specimen_point_m = 2e-4;
+    let sound = stiffness(&input).expect("all is there");
+    // all off by three to five standard deviations along each axis
+    for cell in input.cells.iter_mut().filter(|cell| cell.point_grouping == Grouping::SpecimenA) {
+        let at = NAMES.iter().position(|name| *name == cell.point).expect("one of them");
+        let off = |axis: usize| if (at + axis).is_multiple_of(2) { 6e-4 } else { -1e-3 };
+        cell.point_m = std::array::from_fn(|axis| cell.point_m[axis] + off(axis + at / 3));
+    }
+    let found = stiffness(&input).expect("the signals are the same");
+    let [one] = &found.contradictions[..] else { panic!("{:?}", found.contradictions) };
+    assert_eq!(one.cause, Cause::SpecimenPoints);
+    assert!(one.scatter.is_some_and(|times| (2.0..6.0).contains(&times)), "{one:?}");
+    let width = |own: &Stiffness| own.k_t_n_per_m.ci95[1] - own.k_t_n_per_m.ci95[0];
+    assert!(width(&found) > width(&sound), "{found:?}");
+    let [low, high] = found.k_t_n_per_m.ci95;
+    assert!(low < K && K < high, "{found:?}");
 }
 
 #[test]

@@ -165,6 +165,7 @@ fn of_stiffness(own: &Stiffness, joint: Option<&contact::Joint>, slips: bool) ->
         },
         of_frequency: if trusted { own.of_frequency.clone() } else { Vec::new() },
         diagnosis: Some(own.diagnosis.clone()),
+        contradictions: own.contradictions.clone(),
         doubts: own.doubts.clone(),
     }
 }
@@ -179,6 +180,7 @@ fn unknown(why: String) -> ContactAnswer {
         why,
         of_frequency: Vec::new(),
         diagnosis: None,
+        contradictions: Vec::new(),
         doubts: Vec::new(),
     }
 }

@@ -4,7 +4,7 @@ use super::number::{AnswerLine, BETWEEN, CLAMP, CONTACT};
 use super::number::{micro, short};
 #[cfg(feature = "sim")]
 use crate::analyse::expected::Expected;
-use crate::contact::{Cause, Diagnosis, Doubt, Interval, Stiffness};
+use crate::contact::{Cause, Contradiction, Diagnosis, Doubt, Interval, Stiffness};
 use crate::results::{Answer, Results};
 use crate::substructuring::between_arms::Basis as Estimate;
 use std::collections::BTreeMap;
@@ -29,8 +29,9 @@ pub fn identified(own: &Stiffness, budget: &BTreeMap<Cause, f64>, levels: usize)
     };
     format!(
         "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, {planes}.{beside} \
-         Most of its uncertainty comes from {}.",
-        largest(budget)
+         Most of its uncertainty comes from {}.{}",
+        largest(budget),
+        contradicted(&own.contradictions)
     )
 }
 
@@ -85,10 +86,75 @@ fn of_cause(cause: Cause) -> &'static str {
 pub fn doubted(own: &Stiffness) -> String {
     let reasons: Vec<String> = own.doubts.iter().map(|doubt| of_doubt(*doubt, &own.diagnosis)).collect();
     format!(
-        "No k_T is given, although the fit came out at {}: {}.",
+        "No k_T is given, although the fit came out at {}: {}.{}",
         with_interval(&own.k_t_n_per_m),
-        reasons.join("; ")
+        reasons.join("; "),
+        contradicted(&own.contradictions)
     )
+}
+
+/// What of the plan the data contradict, and what to do; each as a sentence after a space.
+fn contradicted(all: &[Contradiction]) -> String {
+    if all.is_empty() {
+        return String::new();
+    }
+    let told: Vec<String> = all.iter().map(|one| format!(" {}", of_contradiction(one))).collect();
+    format!(" The data contradict the plan.{} The interval allows for these errors.", told.concat())
+}
+
+fn of_contradiction(one: &Contradiction) -> String {
+    if let Some(times) = one.scatter {
+        return format!(
+            "{} are off {times:.1} times as far as stated: measure them again, or state in [priors] how well they are known.",
+            capitalised(of_cause(one.cause))
+        );
+    }
+    let name = match one.cause {
+        Cause::SpecimenPoints | Cause::ArmPoints => capitalised(&one.what),
+        _ => capitalised(&format!("the {}", one.what.trim_start_matches("the "))),
+    };
+    if let Some(other) = &one.swapped_with {
+        return format!("{name} was found where the plan has {other}, and the reverse: are they swapped?");
+    }
+    let off = how_far(one);
+    match one.cause {
+        Cause::Spots | Cause::Centre => format!(
+            "{name} seems {off} off: measure its place again, and the height of the contact's faces. A cable, rod or stop that joins the two sides              beside the contact looks the same: remove it."
+        ),
+        Cause::Gains if one.what == "the load cells' gain" => format!(
+            "{name} in the assembly seems {off} off: calibrate them again. Something that touches arm B in the assembly only, for example a cable, \
+             looks the same: remove it."
+        ),
+        Cause::Gains => format!("{name} seems {off} off: calibrate it again."),
+        Cause::Skew => {
+            format!("{name} seems {off} off: check the filters and the clock of its channel.")
+        }
+        Cause::HammerTilt => format!("{name} seems {off} off: check the direction of these hits."),
+        Cause::SensorAxes => format!("{name} seems {off} off: check how it is mounted."),
+        _ => format!("{name} seems {off} off: measure its place again."),
+    }
+}
+
+/// Deviations that are significant against their own uncertainty, or the largest.
+fn how_far(one: &Contradiction) -> String {
+    let significance = |[off, sigma]: &[f64; 2]| (off / sigma).abs();
+    let most = one.off.iter().map(significance).fold(0.0, f64::max);
+    let of = |(axis, own): (usize, &[f64; 2])| {
+        let [off, _] = *own;
+        (significance(own) >= most.min(3.0)).then(|| match one.cause {
+            Cause::Gains | Cause::SensorAxes => format!("{:.1} %", 100.0 * off.abs()),
+            Cause::Skew => format!("{:.0} µs", 1e6 * off.abs()),
+            Cause::HammerTilt => format!("{:.1}°", off.abs().asin().to_degrees()),
+            _ => format!("{:.2} mm along {}", 1e3 * off.abs(), ["x", "y", "z"][axis % 3]),
+        })
+    };
+    one.off.iter().enumerate().filter_map(of).collect::<Vec<_>>().join(" and ")
+}
+
+/// With a capital first letter.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
@@ -112,7 +178,9 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
             });
         }
         Doubt::Flatness => "the stiffness changes with frequency, which a contact's stiffness does not",
-        Doubt::Sides => "hits on A and on the moving mass give different values",
+        Doubt::Sides => {
+            "hits on A and on the moving mass give different values (has the contact changed between them? compare the first hits with later ones)"
+        }
     }
     .to_owned()
 }
@@ -147,9 +215,7 @@ pub fn not_looked_for() -> String {
 
 /// An error message as a sentence.
 pub fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-    format!("{first}{}.", letters.as_str())
+    format!("{}.", capitalised(text))
 }
 
 /// Why the stiffness of the contact and that between the arms differ, in one sentence; `None` if
