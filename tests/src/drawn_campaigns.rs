@@ -92,12 +92,17 @@ pub fn campaigns<T: Send>(
 /// Runs these campaigns, two at a time, and passes each to `each`; results in the order of
 /// completion.
 pub fn each_of<T: Send>(wanted: &[DrawnCampaign], each: impl Fn(DrawnCampaign) -> T + Sync) -> Vec<T> {
+    self::each(wanted, |campaign| each(*campaign))
+}
+
+/// Does something for each of these, two at a time; results in the order of completion.
+pub fn each<W: Sync, T: Send>(wanted: &[W], each: impl Fn(&W) -> T + Sync) -> Vec<T> {
     let (next, all) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                while let Some(campaign) = wanted.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let one = each(*campaign);
+                while let Some(wanted) = wanted.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let one = each(wanted);
                     all.lock().unwrap().push(one);
                 }
             });

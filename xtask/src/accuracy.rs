@@ -29,8 +29,15 @@ const fn source(
     Source { table, package, module, test, part: None }
 }
 
-const SOURCES: [Source; 11] = [
+const SOURCES: [Source; 13] = [
     source("contact", "jointrig-tests", "contact_accuracy", "accuracy_of_the_contacts_own_stiffness"),
+    source("unseen", "jointrig-tests", "contact_unseen", "rigs_that_nobody_has_seen"),
+    source(
+        "false-assumptions",
+        "jointrig-tests",
+        "contact_unseen",
+        "false_assumptions_on_rigs_that_nobody_has_seen",
+    ),
     source("bending", "jointrig-tests", "contact_accuracy", "contacts_of_specimens_that_bend"),
     Source {
         part: Some(("PLAN", "1")),

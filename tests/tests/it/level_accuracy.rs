@@ -45,14 +45,14 @@ impl Campaign {
     }
 
     fn tell(&self, label: &str) {
-        if let Some(Answer { error, half, covers }) = self.answer() {
+        if let Some(Answer { error, half, covers, .. }) = self.answer() {
             let basis = self.results.answer.as_ref().unwrap().contact.basis;
             let missed = if covers { "" } else { "MISSED" };
             println!("{label} answer: {:+5.1} % ± {:.1} % {basis:?} {missed}", 100.0 * error, 100.0 * half);
         }
         for row in self.levels() {
             let told = match self.named(row) {
-                Some(Answer { error, half, covers }) => format!(
+                Some(Answer { error, half, covers, .. }) => format!(
                     "{:+5.1} % ± {:.1} % {}",
                     100.0 * error,
                     100.0 * half,
