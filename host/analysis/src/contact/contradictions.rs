@@ -114,19 +114,15 @@ pub fn resolved(
     };
     let kind_by_kind = || {
         let mut changes = exchanged.clone();
-        let mut scattering = kinds(&stated);
-        let own = worst(&stated).map(|worst| worst.cause);
-        scattering.extend(own.map(|cause| (cause, scatter(&stated, cause))));
+        let mut worst_kind = worst_kind(&stated);
         for _ in 0..MOST_KINDS {
-            let (cause, scatter) = scattering.into_iter().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+            let (cause, scatter) = worst_kind?;
             *changes.kinds.entry(cause).or_insert(1.0) *= scatter.max(LEAST_SCATTER);
             let found = fit(&changes).ok()?;
             if !remain(&found) {
                 return Some((found, changes));
             }
-            scattering = kinds(&found);
-            let own = worst(&found).map(|worst| worst.cause);
-            scattering.extend(own.map(|cause| (cause, self::scatter(&found, cause))));
+            worst_kind = self::worst_kind(&found);
         }
         None
     };
@@ -134,8 +130,8 @@ pub fn resolved(
 }
 
 /// Part of the motion of a body's points that a rigid motion does not explain, relative to their
-/// rms, both weighted by the noise; none if no impact has enough points. `exchanged` are two points (index of the first
-/// coordinate) with exchanged positions.
+/// rms, both weighted by the noise; none if no impact has enough points. `exchanged` are two points
+/// (index of the first coordinate) with exchanged positions.
 fn not_rigid(
     blocks: &[Block],
     parameters: &[Parameter],
@@ -144,12 +140,10 @@ fn not_rigid(
 ) -> Option<f64> {
     let position = |point: usize| {
         let [one, other] = exchanged.unwrap_or([point; 2]);
-        let at = if point == one {
-            other
-        } else if point == other {
-            one
-        } else {
-            point
+        let at = match point {
+            _ if point == one => other,
+            _ if point == other => one,
+            _ => point,
         };
         Vector3::from_fn(|axis, _| parameters[at + axis].start)
     };
@@ -298,6 +292,12 @@ pub fn worst(fit: &Fit) -> Option<Worst> {
         (excess > 1.0).then(|| Worst { what, deviations: chi_square.sqrt(), cause, excess })
     });
     exceeding.max_by(|a, b| a.excess.total_cmp(&b.excess))
+}
+
+/// The kind that scatters most, or that of the worst quantity, with its scatter.
+fn worst_kind(fit: &Fit) -> Option<(Cause, f64)> {
+    let of_worst = worst(fit).map(|worst| (worst.cause, scatter(fit, worst.cause)));
+    kinds(fit).into_iter().chain(of_worst).max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
 /// Rms of the deviations of a kind's quantities, in stated standard deviations.
