@@ -67,9 +67,9 @@ use block::{Block, Group, POINT, blocks};
 use contradictions::Changes;
 use nalgebra::DVector;
 use outcome::{Variances, of_sum, trusted};
-use parameters::{FORM, LATERAL, Parameters, TIP_B};
+use parameters::{ELASTIC, FORM, LATERAL, Parameters, TIP_B};
 use solver::Certainty;
-use solver::Solution;
+use solver::{Solution, Start};
 
 /// The band in which the contact is evaluated, Hz: above the drift of hammer and windows, below the
 /// first bending modes of the paper's arms and specimens. If others bend at lower frequencies, the
@@ -285,17 +285,23 @@ fn prepared(input: &Input<'_>) -> Result<(Parameters, Vec<Block>), ContactError>
 }
 
 fn fit(input: &Input<'_>, changes: &Changes) -> Result<Fit, ContactError> {
-    let (mut parameters, mut blocks) = prepared(input)?;
+    let (mut parameters, blocks) = prepared(input)?;
     changes.apply(parameters.all_mut());
     let sigma_per_s = input.cells[0].spectra.sigma_per_s();
-    let before = blocks.clone();
-    let solution = solver::solve(&mut blocks, &parameters, &[], sigma_per_s).or_else(|_| {
-        // specimens that hardly bend do not determine the contact's stiffnesses along x and y, and
-        // the search may not settle with them
-        blocks = before;
-        solver::solve(&mut blocks, &parameters, &[LATERAL, LATERAL + 1], sigma_per_s)
-    })?;
+    let (blocks, solution) = solver::solve(&blocks, &parameters, &starts(&parameters), sigma_per_s)?;
     Ok(Fit { parameters, blocks, solution })
+}
+
+/// Where the search begins. A point's height and the specimen's shear change the signals nearly
+/// alike, so that specimens that bend and rigid ones are two minima.
+fn starts(parameters: &Parameters) -> Vec<Start> {
+    let known = |at: usize| (at, parameters.all()[at].start);
+    let rigid = Start { held: vec![(ELASTIC, 0.0)], released: true };
+    // specimens that hardly bend do not determine the contact's stiffnesses along x and y, and the
+    // search may not settle with them
+    let lateral = Start { held: vec![known(LATERAL), known(LATERAL + 1)], released: false };
+    let stated = parameters.all()[ELASTIC].stated;
+    [Start::default(), lateral].into_iter().chain((!stated).then_some(rigid)).collect()
 }
 
 /// Expected stiffness parallel to the load cells, relative to theirs, K = |T/z_B|.

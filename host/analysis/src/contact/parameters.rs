@@ -179,6 +179,12 @@ impl Parameters {
         at
     }
 
+    /// Makes a parameter exactly known.
+    pub fn hold(&mut self, at: usize, value: f64) {
+        self.0[at].start = value;
+        self.0[at].sigma = 0.0;
+    }
+
     /// Sets the prior standard deviation of a parameter.
     pub fn narrow(&mut self, at: usize, sigma: f64) {
         self.0[at].sigma = sigma;
