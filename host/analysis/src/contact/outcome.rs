@@ -193,6 +193,10 @@ const BEYOND: f64 = 5.0;
 /// Standard deviations by which two readings of k_T may differ.
 const APART: f64 = 4.0;
 
+/// Part of the signals of specimen A's points above which they are doubted, as those of a loose
+/// point: where only two impacts on A show the aims, these leave up to 5 %.
+const LOOSE: f64 = 0.06;
+
 /// The residual of some signals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SignalResidual {
@@ -264,6 +268,11 @@ impl Signals {
             chi_square: if expected > 1e-9 { chi / expected } else { 0.0 },
             part: if signal > 0.0 { (chi / signal).sqrt() } else { 0.0 },
         }
+    }
+
+    /// Whether this residual of all lines puts the result in doubt.
+    fn doubted(self, left: SignalResidual) -> bool {
+        self.contradict(left) && (self != Self::SpecimenA || left.part > LOOSE)
     }
 
     /// Whether this residual contradicts the model.
@@ -394,7 +403,7 @@ impl Diagnosis {
     fn doubts(&self, contradicted: bool) -> Vec<Doubt> {
         let left = [self.calibration, self.specimen_a, self.spots];
         let contradicting =
-            Signals::ALL.into_iter().zip(left).filter(|(signals, left)| signals.contradict(*left));
+            Signals::ALL.into_iter().zip(left).filter(|(signals, left)| signals.doubted(*left));
         let mut all: Vec<Doubt> = contradicting.map(|(signals, _)| signals.doubt()).collect();
         if contradicted || self.farthest.as_ref().is_some_and(|one| one.deviations > BEYOND) {
             all.push(Doubt::Stated);

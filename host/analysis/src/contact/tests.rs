@@ -320,7 +320,9 @@ fn what_the_search_holds_counts_in_the_interval() {
     assert!(lateral.iter().all(|at| (solution.p[*at] - start[*at]).abs() > 0.01));
     // the same search with these parameters known exactly ends at the same place, and knows more
     let mut exact = parameters.clone();
-    lateral.iter().for_each(|at| exact.hold(*at, start[*at]));
+    for at in lateral {
+        exact.hold(at, start[at]);
+    }
     let (_, known) = solver::solve(&blocks, &exact, &[Start::default()], SIGMA_PER_S).expect("a minimum");
     let compliance = parameters::COMPLIANCE;
     assert!((known.p[compliance] / held.p[compliance] - 1.0).abs() < 1e-9);
