@@ -45,16 +45,9 @@ impl DrawnCampaign {
         more: impl FnOnce(&Path, &Address, u64),
     ) -> PathBuf {
         let sensors = if self.like.accelerometers { "-accelerometers" } else { "" };
-        let at = |ending: &str| folder.join(format!("{}-{}{sensors}.{ending}", self.number, self.seed));
-        let (file, description) = (at("jrig"), at("toml"));
-        if !file.exists() {
-            let (rig, seed) = (self.rig(), 1000 * self.number + self.seed);
-            std::fs::write(&description, rig.to_toml()).unwrap();
-            let address: Address = format!("sim:{}", description.display()).parse().unwrap();
-            let _ = run(&file, &plan(&rig), address.open(seed).unwrap());
-            more(&file, &address, seed);
-        }
-        file
+        let name = format!("{}-{}{sensors}", self.number, self.seed);
+        let (rig, seed) = (self.rig(), 1000 * self.number + self.seed);
+        measured(folder, &name, &rig, &plan(&rig), seed, more)
     }
 
     /// Results of the campaign; `JOINTRIG_KEEP` names a folder in which the files are kept;
@@ -64,10 +57,41 @@ impl DrawnCampaign {
         plan: fn(&RigConfig) -> String,
         more: impl FnOnce(&Path, &Address, u64),
     ) -> Results {
-        let temporary = tempfile::tempdir().unwrap();
-        let folder = std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), Into::into);
-        found(&self.measured(&folder, plan, more))
+        in_folder(|folder| found(&self.measured(folder, plan, more)))
     }
+}
+
+/// Does something in the folder that `JOINTRIG_KEEP` names, or in a temporary one.
+fn in_folder<T>(own: impl FnOnce(&Path) -> T) -> T {
+    let temporary = tempfile::tempdir().unwrap();
+    own(&std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), PathBuf::from))
+}
+
+/// Runs a campaign on a rig into the file of this name in `folder`, then calls `more`; an existing
+/// file is left unchanged.
+fn measured(
+    folder: &Path,
+    name: &str,
+    rig: &RigConfig,
+    plan: &str,
+    seed: u64,
+    more: impl FnOnce(&Path, &Address, u64),
+) -> PathBuf {
+    let at = |ending: &str| folder.join(format!("{name}.{ending}"));
+    let (file, description) = (at("jrig"), at("toml"));
+    if !file.exists() {
+        std::fs::write(&description, rig.to_toml()).unwrap();
+        let address: Address = format!("sim:{}", description.display()).parse().unwrap();
+        let _ = run(&file, plan, address.open(seed).unwrap());
+        more(&file, &address, seed);
+    }
+    file
+}
+
+/// Results of a campaign with this plan on a rig, whose number is its seed; `JOINTRIG_KEEP` as for
+/// [`DrawnCampaign::results`].
+pub fn results(number: u64, rig: &RigConfig, plan: &str) -> Results {
+    in_folder(|folder| found(&measured(folder, &number.to_string(), rig, plan, number, |_, _, _| {})))
 }
 
 /// Results of a campaign file.

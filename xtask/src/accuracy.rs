@@ -31,13 +31,8 @@ const fn source(
 
 const SOURCES: [Source; 13] = [
     source("contact", "jointrig-tests", "contact_accuracy", "accuracy_of_the_contacts_own_stiffness"),
-    source("unseen", "jointrig-tests", "contact_unseen", "rigs_that_nobody_has_seen"),
-    source(
-        "false-assumptions",
-        "jointrig-tests",
-        "contact_unseen",
-        "false_assumptions_on_rigs_that_nobody_has_seen",
-    ),
+    source("validation", "jointrig-tests", "contact_validation", "rigs_not_used_in_development"),
+    source("false-assumptions", "jointrig-tests", "contact_validation", "false_assumptions"),
     source("bending", "jointrig-tests", "contact_accuracy", "contacts_of_specimens_that_bend"),
     Source {
         part: Some(("PLAN", "1")),

@@ -88,8 +88,8 @@ fn a_vibrometer_that_looks_the_other_way_changes_nothing_if_the_plan_says_so() {
     let turned = "[errors.volts]\nldv_a = -1.0\n";
     let (usual, _) = found(&folder.path().join("usual"), "", &with_direction(LDV_A, "[0, 0, 1]"));
     let (said, signs) = found(&folder.path().join("said"), turned, &with_direction(LDV_A, "[0, 0, -1]"));
-    // the sign of the sensor's noise does not change with it: two seeds differ by 0.7 and 4.4 %, and
-    // the half width of the interval of so few hits is 6 to 7 %
+    // the sign of the sensor's noise does not change with it: two seeds differ by 0.7 and 4.4 %,
+    // and the half width of the interval of so few hits is 6 to 7 %
     let k = k_t(&usual).unwrap();
     assert!((k_t(&said).unwrap() / k - 1.0).abs() < 0.06, "{:?} and {k}", k_t(&said));
     // as for the load cell; the device controls the displacement between the specimens, which would

@@ -9,7 +9,7 @@ mod bridged_contact;
 mod calibration;
 mod compare;
 mod contact_accuracy;
-mod contact_unseen;
+mod contact_validation;
 mod damage;
 mod demo;
 mod export_everything;

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 const CHANNELS: [&str; 9] = ["force", "vib_x", "vib_y", "vib_z", "ldv_a", "ldv_b", "lc_1", "lc_2", "lc_3"];
 
-/// A contact campaign with one hit in each cell; what is told of each channel if `reversed` has the
+/// A contact campaign with one hit in each cell; the verdict on each channel if `reversed` has the
 /// wrong sign.
 fn signs(config: &RigConfig, seed: u64, reversed: Option<&str>) -> BTreeMap<String, Option<bool>> {
     let mut plan = contact_plan(config);

@@ -18,8 +18,8 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// χ² beyond which a quantity with one, two or three coordinates is contradicted: five standard
-/// deviations of a single one. Some sixty are tested, and where few impacts show the aims, deviations
-/// scatter more than by chance.
+/// deviations of a single one. Some sixty are tested, and where few impacts show the aims,
+/// deviations scatter more than by chance.
 const CONTRADICTED: [f64; 3] = [25.0, 30.0, 35.0];
 /// The same for all quantities of a kind, as deviations of a normal distribution.
 const KIND_CONTRADICTED: f64 = 4.5;
@@ -57,7 +57,7 @@ pub struct Contradiction {
     pub scatter: Option<f64>,
     /// The point at whose stated position this one was found, and the reverse.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub swapped_with: Option<String>,
+    pub exchanged_with: Option<String>,
 }
 
 /// Changes of the stated priors.
@@ -92,8 +92,8 @@ fn tested(own: &Parameter) -> bool {
 }
 
 /// The fit with the priors of contradicted quantities widened as far as needed; `fit` fits with
-/// changed priors, `exchanged` says which points are exchanged. If what is contradicted
-/// cannot be found, the fit with the stated priors is returned.
+/// changed priors, `exchanged` says which points are exchanged. If what is contradicted cannot be
+/// found, the fit with the stated priors is returned.
 ///
 /// # Errors
 /// As the fit with stated priors.
@@ -164,6 +164,7 @@ fn not_rigid(
                 (r, [along.x, along.y, along.z, turn.x, turn.y, turn.z])
             })
             .collect();
+        // three points along three axes
         if rows.len() < 9 {
             continue;
         }
@@ -239,17 +240,17 @@ impl Changes {
             scatter: Some(*scatter),
             ..Contradiction::new(cause.name(), *cause)
         };
-        let swapped = self.exchanged.iter().map(|[one, other]| Contradiction {
-            swapped_with: Some(other.clone()),
+        let exchanged = self.exchanged.iter().map(|[one, other]| Contradiction {
+            exchanged_with: Some(other.clone()),
             ..Contradiction::new(one, fit.parameters.all()[quantities(fit, |_| true)[one][0]].cause)
         });
-        self.quantities.iter().map(of).chain(self.kinds.iter().map(kind)).chain(swapped).collect()
+        self.quantities.iter().map(of).chain(self.kinds.iter().map(kind)).chain(exchanged).collect()
     }
 }
 
 impl Contradiction {
     fn new(what: &str, cause: Cause) -> Self {
-        Contradiction { what: what.to_owned(), cause, off: Vec::new(), scatter: None, swapped_with: None }
+        Contradiction { what: what.to_owned(), cause, off: Vec::new(), scatter: None, exchanged_with: None }
     }
 }
 

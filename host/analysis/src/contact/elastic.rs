@@ -192,8 +192,8 @@ impl Shape {
         }
     }
 
-    /// At a point whose coordinates are relative to the contact, m. The parameters of both specimens
-    /// are counted from `first`.
+    /// At a point whose coordinates are relative to the contact, m. The parameters of both
+    /// specimens are counted from `first`.
     pub fn at(&self, r: [f64; 3], first: usize) -> Deflected {
         let Shape { shear: a, ratios, clamp_m, of_b } = *self;
         let side = if of_b.is_some() { -1.0 } else { 1.0 };

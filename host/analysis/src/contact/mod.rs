@@ -216,10 +216,10 @@ impl Known {
 /// As [`stiffness`].
 pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
     let mut input = input.clone();
-    let (parameters, blocks) = prepared(&input)?;
-    let exchanged = Changes::of_exchanged(&blocks, parameters.all());
     loop {
-        let (fit, changes) = contradictions::resolved(&exchanged, |changes| fit(&input, changes))?;
+        let prepared = Prepared::new(&input)?;
+        let exchanged = Changes::of_exchanged(&prepared.blocks, prepared.parameters.all());
+        let (fit, changes) = contradictions::resolved(&exchanged, |changes| prepared.fit(changes))?;
         let band_hz = trusted(&fit.blocks, &fit.solution.bins, input.band_hz);
         if band_hz == input.band_hz {
             // with wide priors the data may not determine the contact: then it is the fit with the
@@ -228,7 +228,7 @@ pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
                 if changes == exchanged {
                     return Err(error);
                 }
-                self::fit(&input, &exchanged)?.told(&input, &exchanged)
+                prepared.fit(&exchanged)?.told(&input, &exchanged)
             });
         }
         // lines at the ends that contradict the model biased this fit: the next fit judges again
@@ -254,42 +254,52 @@ impl Fit {
 }
 
 /// The parameters with their stated priors, and the measured signals.
-fn prepared(input: &Input<'_>) -> Result<(Parameters, Vec<Block>), ContactError> {
-    let spots = input.spots_from_contact();
-    if spots.is_none() && input.cells.iter().any(ContactCell::has_spots) {
-        return Err(ContactError::NoSpots);
-    }
-    // without spots no signal depends on their positions
-    let mut parameters =
-        Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default(), input.elastic_priors());
-    let blocks = blocks(input, &mut parameters)?;
-    if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
-        return Err(ContactError::NoForce);
-    }
-    if !blocks.iter().any(|block| block.along_z.is_none()) {
-        return Err(ContactError::NoRotation);
-    }
-    let lines: usize =
-        blocks.iter().filter(|block| block.along_z.is_none()).map(|block| block.lines.len()).sum();
-    if lines < FEWEST_LINES {
-        return Err(ContactError::NotIdentified(format!(
-            "only {lines} lines of the hits on the assembly have valid values and a known noise in every cell"
-        )));
-    }
-    scale_form(&mut parameters, &blocks);
-    if input.includes_specimen_b() {
-        // no signal separates it from the contact
-        parameters.narrow(TIP_B, 0.0);
-    }
-    Ok((parameters, blocks))
+struct Prepared {
+    parameters: Parameters,
+    blocks: Vec<Block>,
+    /// Damping of the window, 1/s.
+    sigma_per_s: f64,
 }
 
-fn fit(input: &Input<'_>, changes: &Changes) -> Result<Fit, ContactError> {
-    let (mut parameters, blocks) = prepared(input)?;
-    changes.apply(parameters.all_mut());
-    let sigma_per_s = input.cells[0].spectra.sigma_per_s();
-    let (blocks, solution) = solver::solve(&blocks, &parameters, &starts(&parameters), sigma_per_s)?;
-    Ok(Fit { parameters, blocks, solution })
+impl Prepared {
+    fn new(input: &Input<'_>) -> Result<Self, ContactError> {
+        let spots = input.spots_from_contact();
+        if spots.is_none() && input.cells.iter().any(ContactCell::has_spots) {
+            return Err(ContactError::NoSpots);
+        }
+        // without spots no signal depends on their positions
+        let mut parameters =
+            Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default(), input.elastic_priors());
+        let blocks = blocks(input, &mut parameters)?;
+        if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
+            return Err(ContactError::NoForce);
+        }
+        if !blocks.iter().any(|block| block.along_z.is_none()) {
+            return Err(ContactError::NoRotation);
+        }
+        let lines: usize =
+            blocks.iter().filter(|block| block.along_z.is_none()).map(|block| block.lines.len()).sum();
+        if lines < FEWEST_LINES {
+            return Err(ContactError::NotIdentified(format!(
+                "only {lines} lines of the hits on the assembly have valid values and a known noise in every cell"
+            )));
+        }
+        scale_form(&mut parameters, &blocks);
+        if input.includes_specimen_b() {
+            // no signal separates it from the contact
+            parameters.narrow(TIP_B, 0.0);
+        }
+        Ok(Prepared { parameters, blocks, sigma_per_s: input.cells[0].spectra.sigma_per_s() })
+    }
+
+    /// The fit with these changes of the priors.
+    fn fit(&self, changes: &Changes) -> Result<Fit, ContactError> {
+        let mut parameters = self.parameters.clone();
+        changes.apply(parameters.all_mut());
+        let starts = starts(&parameters);
+        let (blocks, solution) = solver::solve(&self.blocks, &parameters, &starts, self.sigma_per_s)?;
+        Ok(Fit { parameters, blocks, solution })
+    }
 }
 
 /// Where the search begins. A point's height and the specimen's shear change the signals nearly

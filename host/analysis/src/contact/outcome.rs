@@ -10,7 +10,7 @@
 //! and stays a doubt.
 
 use super::block::Block;
-use super::contradictions::{self, Changes, Contradiction};
+use super::contradictions::{self, Changes, Contradiction, Worst};
 use super::parameters::{COMPLIANCE, Cause, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
 use super::{ContactError, Fit, Input};
@@ -86,10 +86,7 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
     let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_gain).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
-    let mut diagnosis = diagnose(blocks, parameters, solution);
-    if let Some(contradictions::Worst { what, deviations, .. }) = contradictions::worst(fit) {
-        diagnosis.farthest = Some(Farthest { what, deviations });
-    }
+    let diagnosis = diagnose(fit);
     Ok(Stiffness {
         k_t_n_per_m: k_t,
         c_t_n_s_per_m: c_t,
@@ -286,7 +283,8 @@ impl Signals {
 pub struct Farthest {
     /// Name of the position, angle, gain or delay.
     pub what: String,
-    /// Its deviation, in stated standard deviations.
+    /// Its deviation: if the data contradict it, in standard deviations of the deviation, else in
+    /// stated ones.
     pub deviations: f64,
 }
 
@@ -301,8 +299,8 @@ pub struct Diagnosis {
     pub spots: SignalResidual,
     /// χ² per degree of freedom of k_T(f) being a single number.
     pub flatness_chi_square: f64,
-    /// The position, angle, gain or delay that deviates most from its stated value; none if nothing
-    /// is stated.
+    /// The position, angle, gain or delay that the data contradict most, or else the one that
+    /// deviates most from its stated value; none if nothing is stated.
     pub farthest: Option<Farthest>,
     /// Difference between the compliance from hits on A and from hits on the moving mass, in
     /// standard deviations; none if only one was hit.
@@ -369,7 +367,10 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
 
 /// Tests every assumption. Aims are not candidates for the largest deviation: on the moving mass
 /// they absorb the effect of shifts of the hammer. Neither are guesses.
-fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> Diagnosis {
+fn diagnose(fit: &Fit) -> Diagnosis {
+    let Fit { parameters, blocks, solution } = fit;
+    let contradicted =
+        contradictions::worst(fit).map(|Worst { what, deviations, .. }| Farthest { what, deviations });
     let stated =
         parameters.all().iter().zip(&solution.p).filter(|(own, _)| {
             own.stated && !matches!(own.cause, Cause::Noise | Cause::Aim) && own.sigma > 0.0
@@ -391,15 +392,15 @@ fn diagnose(blocks: &[Block], parameters: &Parameters, solution: &Solution) -> D
         calibration: Signals::Calibration.left(blocks, solution.bins.iter()),
         specimen_a: Signals::SpecimenA.left(blocks, solution.bins.iter()),
         spots: Signals::Spots.left(blocks, solution.bins.iter()),
-        farthest,
+        farthest: contradicted.or(farthest),
         flatness_chi_square: if parts.is_empty() { 1.0 } else { flatness / parts.len() as f64 },
         sides_apart: sides.map(|part| part.deviation / part.sigma),
     }
 }
 
 impl Diagnosis {
-    /// The assumptions that do not hold; `contradicted` states whether the data contradict something
-    /// stated.
+    /// The assumptions that do not hold; `contradicted` states whether the data contradict
+    /// something stated.
     fn doubts(&self, contradicted: bool) -> Vec<Doubt> {
         let left = [self.calibration, self.specimen_a, self.spots];
         let contradicting =

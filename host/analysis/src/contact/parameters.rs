@@ -251,9 +251,9 @@ pub struct ContactPriors {
 }
 
 impl Default for ContactPriors {
-    /// Spots placed to 0.05 mm, the contact's centre to 1 mm across and 0.05 mm in height, points on
-    /// specimens to 0.3 mm, gains calibrated to 0.5 %, delays
-    /// known to 2 µs, axes of fixed sensors to 0.02 (about one degree).
+    /// Spots placed to 0.05 mm, the contact's centre to 1 mm across and 0.05 mm in height, points
+    /// on specimens to 0.3 mm, gains calibrated to 0.5 %, delays known to 2 µs, axes of fixed
+    /// sensors to 0.02 (about one degree).
     fn default() -> Self {
         ContactPriors {
             positions: Positions::default(),

@@ -4,8 +4,8 @@
 //! Residuals of a cell beyond its noise come from aim errors that other impacts do not show, a bad
 //! hit or a misplaced point, and are proportional to the signal. They are therefore counted as
 //! noise proportional to it, separately for each cell and instrument, with the fraction that brings
-//! the residual to its expected value, and more ([`ALIKE`]). An outlying cell thus gets less weight;
-//! the weights of the others stay the same.
+//! the residual to its expected value, times [`ALIKE`]. An outlying cell thus gets less weight; the
+//! weights of the others stay the same.
 
 use super::ContactError;
 use super::block::Block;

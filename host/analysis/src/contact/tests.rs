@@ -311,7 +311,8 @@ fn a_stated_bulk_that_the_points_contradict_is_doubted() {
 fn what_the_search_holds_counts_in_the_interval() {
     let cells = measured(World { noise_m_per_s: 1e-7, bulk: [2.4e-7, 0.014], ..QUIET });
     let input = Input { specimens: [None; 2], ..input(&cells) };
-    let Fit { parameters, blocks, solution } = fit(&input, &Changes::default()).expect("all is there");
+    let Fit { parameters, blocks, solution } =
+        Prepared::new(&input).and_then(|own| own.fit(&Changes::default())).expect("all is there");
     let lateral = [parameters::LATERAL, parameters::LATERAL + 1];
     let start = parameters.start();
     let from = Start { held: lateral.map(|at| (at, start[at])).to_vec(), released: false };
@@ -339,7 +340,8 @@ fn a_search_rests_when_all_parameters_do_and_not_the_compliance_alone() {
     let cells = measured(World { noise_m_per_s: 5e-7, ..QUIET });
     let mut input = input(&cells);
     input.priors = ContactPriors { skew_s: 2e-6, gain: 5e-3, ..input.priors };
-    let Fit { parameters, blocks, solution } = fit(&input, &Changes::default()).expect("all is there");
+    let Fit { parameters, blocks, solution } =
+        Prepared::new(&input).and_then(|own| own.fit(&Changes::default())).expect("all is there");
     let sigma = |at: usize| solution.certainty.covariance[(at, at)].sqrt();
     // the load cells' gain and delay, and the spot on A
     for at in [parameters::FORM, parameters::FORM + 1, parameters::SPOTS] {
@@ -386,7 +388,7 @@ fn exchanged_points_are_named_and_what_is_stated_truly_is_not() {
     }
     let exchanged = stiffness(&input).expect("the signals are the same");
     let [one] = &exchanged.contradictions[..] else { panic!("{:?}", exchanged.contradictions) };
-    let mut both = [Some(one.what.clone()), one.swapped_with.clone()];
+    let mut both = [Some(one.what.clone()), one.exchanged_with.clone()];
     both.sort();
     assert_eq!(both, [NAMES[4], NAMES[7]].map(|name| Some(format!("point {name}"))));
     // the same positions as before

@@ -29,9 +29,10 @@ pub fn identified(own: &Stiffness, budget: &BTreeMap<Cause, f64>, levels: usize)
     };
     format!(
         "The force is calibrated with hits on B alone, and the specimen's rotation is measured: this is the contact's own stiffness, {planes}.{beside} \
-         Most of its uncertainty comes from {}.{}",
+         Most of its uncertainty comes from {}.{}{}",
         largest(budget),
-        contradicted(&own.contradictions)
+        contradicted(&own.contradictions),
+        if own.contradictions.is_empty() { "" } else { " The interval allows for these errors." }
     )
 }
 
@@ -99,7 +100,7 @@ fn contradicted(all: &[Contradiction]) -> String {
         return String::new();
     }
     let told: Vec<String> = all.iter().map(|one| format!(" {}", of_contradiction(one))).collect();
-    format!(" The data contradict the plan.{} The interval allows for these errors.", told.concat())
+    format!(" The data contradict the plan.{}", told.concat())
 }
 
 fn of_contradiction(one: &Contradiction) -> String {
@@ -113,25 +114,26 @@ fn of_contradiction(one: &Contradiction) -> String {
         Cause::SpecimenPoints | Cause::ArmPoints => capitalised(&one.what),
         _ => capitalised(&format!("the {}", one.what.trim_start_matches("the "))),
     };
-    if let Some(other) = &one.swapped_with {
-        return format!("{name} was found where the plan has {other}, and the reverse: are they swapped?");
+    if let Some(other) = &one.exchanged_with {
+        return format!("{name} was found where the plan has {other}, and the reverse: are they exchanged?");
     }
     let off = how_far(one);
     match one.cause {
         Cause::Spots | Cause::Centre => format!(
-            "{name} seems {off} off: measure its place again, and the height of the contact's faces. A cable, rod or stop that joins the two sides              beside the contact looks the same: remove it."
+            "{name} seems off by {off}: measure its place again, and the height of the contact's faces. A cable, rod or stop that joins the two sides \
+             beside the contact looks the same: remove it."
         ),
         Cause::Gains if one.what == "the load cells' gain" => format!(
-            "{name} in the assembly seems {off} off: calibrate them again. Something that touches arm B in the assembly only, for example a cable, \
+            "{name} in the assembly seems off by {off}: calibrate them again. Something that touches arm B in the assembly only, for example a cable, \
              looks the same: remove it."
         ),
-        Cause::Gains => format!("{name} seems {off} off: calibrate it again."),
+        Cause::Gains => format!("{name} seems off by {off}: calibrate it again."),
         Cause::Skew => {
-            format!("{name} seems {off} off: check the filters and the clock of its channel.")
+            format!("{name} seems off by {off}: check the filters and the clock of its channel.")
         }
-        Cause::HammerTilt => format!("{name} seems {off} off: check the direction of these hits."),
-        Cause::SensorAxes => format!("{name} seems {off} off: check how it is mounted."),
-        _ => format!("{name} seems {off} off: measure its place again."),
+        Cause::HammerTilt => format!("{name} seems off by {off}: check the direction of these hits."),
+        Cause::SensorAxes => format!("{name} seems off by {off}: check how it is mounted."),
+        _ => format!("{name} seems off by {off}: measure its place again."),
     }
 }
 
@@ -288,5 +290,37 @@ fn contact(answer: &Answer) -> String {
             own.why
         ),
         (None, _) => format!("The contact: no k_T. {}", own.why),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_contradiction_says_what_is_off_and_what_to_do() {
+        let of = |what: &str, cause, off: &[[f64; 2]]| Contradiction {
+            what: what.into(),
+            cause,
+            off: off.to_vec(),
+            scatter: None,
+            exchanged_with: None,
+        };
+        let point = of("point C3", Cause::SpecimenPoints, &[[1e-5, 1e-4], [-1.2e-3, 1e-4], [0.0, 1e-4]]);
+        let spot = of("the spot on A", Cause::Spots, &[[0.0, 1e-5], [1.5e-4, 1e-5]]);
+        let gain = of("gain of the vibrometer on A's spot", Cause::Gains, &[[0.043, 0.005]]);
+        let exchanged = Contradiction { exchanged_with: Some("point C1".into()), ..point.clone() };
+        let kind = Contradiction { scatter: Some(2.9), off: Vec::new(), ..point.clone() };
+        for (one, wanted) in [
+            (&point, "Point C3 seems off by 1.20 mm along y: measure its place again."),
+            (&gain, "The gain of the vibrometer on A's spot seems off by 4.3 %: calibrate it again."),
+            (&exchanged, "Point C3 was found where the plan has point C1"),
+            (&kind, "The positions of the points on the specimen are off 2.9 times as far as stated"),
+            (&spot, "joins the two sides beside the contact looks the same"),
+        ] {
+            let text = of_contradiction(one);
+            assert!(text.contains(wanted) && !text.contains("  "), "{text}");
+        }
+        assert_eq!(contradicted(&[]), "");
     }
 }

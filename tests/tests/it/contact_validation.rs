@@ -1,14 +1,13 @@
-//! The contact's k_T on rigs that nobody has seen: how often the interval covers the truth, and
-//! whether a false assumption is noticed. The rigs were fixed before the estimator was run on them.
+//! The contact's k_T on rigs that were not used in development: how often the interval covers the
+//! truth, and whether a false assumption is noticed. The rigs' numbers were committed before the
+//! estimator was run on them.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::device::address::Address;
 use jointrig::results::ContactAnswer;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::Patch;
-use jointrig_tests::campaign::run;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, QUALITY_COLUMNS, Quality, print_table};
-use jointrig_tests::drawn_campaigns::{count, each, found};
+use jointrig_tests::drawn_campaigns::{count, each, results};
 use jointrig_tests::rigs::{Drawn, Elastic, contact_plan, drawn};
 
 /// What bends on the rig of this number: half are rigid, a quarter have specimens that bend, and on
@@ -21,19 +20,9 @@ fn sound(number: u64) -> RigConfig {
     drawn(number, Drawn { elastic: bends(number), ..Drawn::default() })
 }
 
-/// Runs `contact.toml` with the priors of `stated` on `rig`. `JOINTRIG_KEEP` names a folder in
-/// which the files are kept; existing files are analysed again without a new run.
+/// Runs `contact.toml` with the priors of `stated` on `rig`.
 fn measured(number: u64, stated: &RigConfig, rig: &RigConfig) -> ContactAnswer {
-    let temporary = tempfile::tempdir().unwrap();
-    let folder = std::env::var_os("JOINTRIG_KEEP").map_or(temporary.path().to_owned(), Into::into);
-    let at = |ending: &str| folder.join(format!("{number}.{ending}"));
-    let (file, description) = (at("jrig"), at("toml"));
-    if !file.exists() {
-        std::fs::write(&description, rig.to_toml()).unwrap();
-        let address: Address = format!("sim:{}", description.display()).parse().unwrap();
-        let _ = run(&file, &contact_plan(stated), address.open(number).unwrap());
-    }
-    found(&file).answer.unwrap().contact
+    results(number, rig, &contact_plan(stated)).answer.unwrap().contact
 }
 
 fn answer(rig: &RigConfig, found: &ContactAnswer) -> Option<Answer> {
@@ -50,8 +39,8 @@ struct Sound {
 }
 
 #[test]
-#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: rigs that nobody has seen"]
-fn rigs_that_nobody_has_seen() {
+#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: rigs not used in development"]
+fn rigs_not_used_in_development() {
     let numbers: Vec<u64> = (0..count("RIGS", 200)).map(|n| count("FIRST", 7000) + n).collect();
     let all = each(&numbers, |number| {
         let rig = sound(*number);
@@ -87,7 +76,11 @@ fn rigs_that_nobody_has_seen() {
         row("below 130 N/µm", &|one| one.k_n_per_m < 130e6),
         row("130 N/µm and more", &|one| one.k_n_per_m >= 130e6),
     ];
-    print_table("unseen", &format!("rigs | campaigns | no answer | {COLUMNS} | {QUALITY_COLUMNS}"), &rows);
+    print_table(
+        "validation",
+        &format!("rigs | campaigns | no answer | {COLUMNS} | {QUALITY_COLUMNS}"),
+        &rows,
+    );
     let z: Vec<f64> = all.iter().filter_map(|one| one.answer).map(|own| own.z).collect();
     let tenths = jointrig_tests::coverage::tenths(&z);
     println!("truths in each tenth of the stated distribution: {tenths:?}");
@@ -202,7 +195,7 @@ const FALSE: [False; 17] = [
             let [one, other] = [["C1", "C2"], ["B1", "B2"], ["C1", "C3"], ["D1", "D2"], ["B1", "B3"]][i];
             exchange(rig, one, other);
         },
-        &["swapped"],
+        &["exchanged"],
     ),
     (
         "a point 1.5 to 2.5 mm off",
@@ -235,7 +228,7 @@ const FALSE: [False; 17] = [
 
 #[test]
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: false assumptions"]
-fn false_assumptions_on_rigs_that_nobody_has_seen() {
+fn false_assumptions() {
     let (first, rigs) = (count("FIRST", 6000), count("RIGS", 5).min(5) as usize);
     let only = count("ROW", u64::MAX);
     let wanted: Vec<(usize, usize)> = (0..FALSE.len())
