@@ -22,6 +22,11 @@
 //! previous value, which becomes the edge. Below the edge, a correction may go up to the edge;
 //! beyond it, corrections are bounded, initially to a quarter of that step. All of them are divided
 //! by the steepness found from the last two measurements.
+//!
+//! A contact that has begun to slip can soften so far that its resonance comes down to the drive's
+//! frequency; then the amplitude creeps past the ceiling, and a drive reduced by the largest
+//! correction lets the contact stick again: without a change the same would repeat for ever.
+//! Therefore each return from above the ceiling halves the bound of all later corrections.
 
 use crate::hammer::Scanned;
 use heapless::Vec;
@@ -51,6 +56,8 @@ const FORGETS: f32 = 0.25;
 const TELLING: f32 = 2e-4;
 /// The largest logarithmic correction of a steep plant: ln 1.2.
 const STRIDE: f32 = 0.182;
+/// Smallest bound of a steep plant's corrections, logarithmic.
+const LEAST_STRIDE: f32 = STRIDE / 64.0;
 /// Factor on the bound of the next correction after a correction that was too large ([`SHORTER`]),
 /// and after one that was not ([`LONGER`]).
 const SHORTER: f32 = 0.25;
@@ -128,6 +135,8 @@ struct Steep {
     ness: f32,
     /// The largest logarithmic correction beyond the edge.
     stride: f32,
+    /// Upper bound of all corrections and of the stride.
+    longest: f32,
     /// Drive up to which the ceiling is not exceeded, V.
     edge_v: f32,
 }
@@ -254,7 +263,8 @@ impl Servo {
         let (last_v, amplitude) = self.last.filter(|(last_v, _)| drive_v > last_v * (1.0 + TELLING))?;
         let step = logarithm(drive_v / last_v);
         let ness = (logarithm(glance / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
-        Some(Steep { ness, stride: SHORTER * step, edge_v: last_v })
+        let longest = self.steep.map_or(STRIDE, |steep| steep.longest);
+        Some(Steep { ness, stride: SHORTER * step, longest, edge_v: last_v })
     }
 
     /// Returns from above the ceiling: the required drive.
@@ -275,11 +285,14 @@ impl Servo {
             return Ok(drive_v);
         }
         // even the drive of the last measurement is too large now
-        let Steep { ness, stride, .. } = self.steep.unwrap_or(Steep { ness: 1.0, stride: 0.0, edge_v: 0.0 });
-        let back = (logarithm(glance / self.target) / ness).max(stride).min(STRIDE);
-        let back_v = drive_v * exponential(-back);
+        let unknown = Steep { ness: 1.0, stride: 0.0, longest: STRIDE, edge_v: 0.0 };
+        let Steep { ness, stride, longest, .. } = self.steep.unwrap_or(unknown);
+        let back = (logarithm(glance / self.target) / ness).max(stride).min(longest);
+        // while the amplitude stays above the ceiling, further each time
+        let back_v = drive_v * exponential(-(back * f32::from(self.beyond)).min(STRIDE));
+        let longest = if self.beyond == 1 { (0.5 * longest).max(LEAST_STRIDE) } else { longest };
         self.last = None;
-        self.steep = Some(Steep { ness, stride: back, edge_v: back_v });
+        self.steep = Some(Steep { ness, stride: back.min(longest), longest, edge_v: back_v });
         Ok(back_v)
     }
 
@@ -295,7 +308,7 @@ impl Servo {
             steep.ness = if seen > steep.ness { seen } else { steep.ness + FORGETS * (seen - steep.ness) };
         }
         if drive_v >= steep.edge_v {
-            steep.stride = (LONGER * steep.stride).min(STRIDE);
+            steep.stride = (LONGER * steep.stride).min(steep.longest);
         }
     }
 
@@ -303,13 +316,13 @@ impl Servo {
         // with noise alone, the measured amplitude may be zero
         let ratio = self.target / self.measured.max(f32::MIN_POSITIVE);
         let missing = logarithm(ratio);
-        let Some(Steep { ness, stride, edge_v }) = self.steep else {
+        let Some(Steep { ness, stride, longest, edge_v }) = self.steep else {
             return exponential(PART * missing).clamp(1.0 / FACTOR, FACTOR);
         };
         // not `clamp`: its panic for non-constant bounds can format floats, which takes 16 kB of
         // flash
         let bound =
-            if drive_v < edge_v { logarithm(edge_v / drive_v).max(stride).min(STRIDE) } else { stride };
+            if drive_v < edge_v { logarithm(edge_v / drive_v).max(stride).min(longest) } else { stride };
         exponential((STEEP_PART * missing / ness).max(-stride).min(bound))
     }
 }
@@ -533,6 +546,67 @@ mod tests {
             }
             assert!(seen.len() >= 2 && seen.iter().all(|seen| (seen.glance - 1.0).abs() < 1e-3), "{seen:?}");
         }
+    }
+
+    /// One scan of one channel.
+    struct Scan(i16);
+
+    impl Scanned for Scan {
+        fn first_scan(&self) -> u64 {
+            0
+        }
+
+        fn scans(&self) -> usize {
+            1
+        }
+
+        fn code(&self, _scan: usize, _channel: usize) -> i16 {
+            self.0
+        }
+    }
+
+    #[test]
+    fn a_slipping_contact_whose_amplitude_creeps_upwards_is_held() {
+        use jointrig_protocol::channel::{Name, Quantity};
+        let channel = Channel {
+            name: Name::new(),
+            role: Role::Excitation,
+            quantity: Quantity::Force,
+            units_per_volt: 1.0,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        };
+        let gauges = Gauges { channels: &[channel], units_per_code: &[1e-3] };
+        let step = jointrig_protocol::request::Shake::step_of(25.0, 51_200);
+        let target = 10.0;
+        let control = Control::Force { amplitude_n: target };
+        let mut servo =
+            Servo::new(&gauges, 51_200, control, step, 10.0).expect("a channel that it can control");
+        // stuck up to 2.82 V, and again when the drive falls below 2.5 V; slipping, it follows the
+        // drive up to 2.865 V in some cycles, and grows slowly at any drive beyond
+        let (mut drive_v, mut amplitude, mut slips) = (servo.first_v(), 0.0_f32, false);
+        let (mut angle, mut cycles_outside) = (0_u32, 0);
+        for cycle in 0..1000 {
+            slips = if slips { drive_v > 2.5 } else { drive_v > 2.82 };
+            amplitude = match (slips, drive_v > 2.865) {
+                (false, _) => 0.2 * drive_v,
+                (true, false) => amplitude + 0.4 * (6.0 + 20.0 * (drive_v - 2.82) - amplitude),
+                (true, true) => amplitude.max(6.0) * (1.05 + 10.0 * (drive_v - 2.865)).min(1.2),
+            };
+            for _ in 0..2048 {
+                let block = Scan((1e3 * amplitude * sine(angle)) as i16);
+                if let Some(wanted_v) = servo.feed(&block, 0, angle, step, drive_v).expect("no trouble") {
+                    drive_v = wanted_v;
+                }
+                angle = angle.wrapping_add(step);
+            }
+            cycles_outside += u32::from(cycle >= 500 && (amplitude / target - 1.0).abs() > 0.5);
+        }
+        assert!(
+            cycles_outside == 0,
+            "{cycles_outside} of the last 500 cycles, at last {amplitude} at {drive_v} V"
+        );
     }
 
     #[test]

@@ -204,7 +204,11 @@ impl Slider {
 fn slipped(slider: &Slider, levels: Vec<Level>) -> Vec<(Level, [f64; 3])> {
     let bench = Bench::new();
     let Slider { k, friction, load } = *slider;
-    bench.run(&slider.rig(&bench), &LevelOptions { seconds: 1.0, ..options(levels) }).unwrap();
+    let options = LevelOptions { seconds: 1.0, ..options(levels) };
+    let summary = bench.run(&slider.rig(&bench), &options).unwrap();
+    for outcome in &summary.outcomes {
+        assert!(matches!(outcome, Outcome::Stored(_)), "k_T {k} N/µm, μ {friction}: {outcome:?}");
+    }
     let results = bench.analysed();
     let rows = rows(&results, Force::Raw);
     let levels = rows_of(&bench);
