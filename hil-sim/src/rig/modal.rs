@@ -70,10 +70,9 @@ pub fn modes(space: &StateSpace) -> Result<Vec<Mode>, ModalError> {
     if states != order || lambdas.iter().any(|lambda| !lambda.is_finite()) {
         return Err(ModalError::NoEigenvalues);
     }
-    let complex = space.a.map(Complex::from);
     let mut found = Vec::with_capacity(lambdas.len());
     for guess in lambdas {
-        let (lambda, right) = vector(&complex, guess).ok_or(ModalError::NoEigenvalues)?;
+        let (lambda, right) = vector(space, guess).ok_or(ModalError::NoEigenvalues)?;
         let weight = if guess.im > 0.0 { 2.0 } else { 1.0 };
         found.push(Mode { lambda, weight, right, left: DVector::zeros(order) });
     }
@@ -83,13 +82,23 @@ pub fn modes(space: &StateSpace) -> Result<Vec<Mode>, ModalError> {
 }
 
 /// Inverse iteration from `guess`: eigenvalue and unit vector. A real guess stays real.
-fn vector(a: &DMatrix<Complex<f64>>, guess: Complex<f64>) -> Option<(Complex<f64>, DVector<Complex<f64>>)> {
-    let order = a.nrows();
+///
+/// With x = (u, v), the first half of (A − σ) x = b says v = (b₁ + σ u)/d; inserted into the second
+/// half, it leaves n equations for u, to be factored at an eighth of the cost of all 2n.
+fn vector(space: &StateSpace, guess: Complex<f64>) -> Option<(Complex<f64>, DVector<Complex<f64>>)> {
+    let (order, n) = (space.order(), space.scale.len());
     // Exactly at the eigenvalue the factorisation may have a zero pivot; with a relative offset of
     // 1e-12 it converges as fast.
     let shift = guess * (1.0 + 1e-12) + f64::MIN_POSITIVE;
-    let shifted = a - DMatrix::from_diagonal_element(order, order, shift);
-    let factors = shifted.lu();
+    let lower = |columns: usize| space.a.view((n, columns), (n, n)).map(Complex::from);
+    let (stiffness, mut damped) = (lower(0), lower(n));
+    (0..n).for_each(|i| damped[(i, i)] -= shift);
+    let inverse = space.scale.map(|d| Complex::from(d.recip()));
+    let mut reduced = damped.clone();
+    for (mut column, d) in reduced.column_iter_mut().zip(&inverse) {
+        column *= shift * d;
+    }
+    let factors = (stiffness + reduced).lu();
     // Any start with a component in every mode works; it is fixed so that the result is
     // deterministic.
     let mut x = DVector::from_fn(order, |i, _| {
@@ -97,14 +106,21 @@ fn vector(a: &DMatrix<Complex<f64>>, guess: Complex<f64>) -> Option<(Complex<f64
         Complex::from_polar(1.0 + 0.37 * (0.9 * i as f64).sin(), angle)
     });
     for _ in 0..ITERATIONS {
-        x = factors.solve(&x)?;
+        let first = inverse.component_mul(&x.rows(0, n));
+        let u = factors.solve(&(x.rows(n, n) - &damped * &first))?;
+        let v = first + u.component_mul(&inverse) * shift;
+        x.rows_mut(0, n).copy_from(&u);
+        x.rows_mut(n, n).copy_from(&v);
         let norm = x.norm();
         if !(norm.is_finite() && norm > 0.0) {
             return None;
         }
         x.unscale_mut(norm);
     }
-    let mut lambda = x.dotc(&(a * &x));
+    let moved = DVector::from_fn(order, |i, _| {
+        space.a.row(i).iter().zip(x.iter()).map(|(a, x)| x * *a).sum::<Complex<f64>>()
+    });
+    let mut lambda = x.dotc(&moved);
     if guess.im <= 0.0 {
         lambda.im = 0.0;
     }
@@ -144,7 +160,8 @@ fn invert(modes: &mut [Mode], order: usize) -> Result<(), ModalError> {
     Ok(())
 }
 
-/// Compares (s − A)⁻¹ from the modes with a direct solve, at, near and far from the resonances.
+/// Compares (s − A)⁻¹ b from the modes with a direct solve, for two fixed b that excite every state,
+/// at, near and far from the resonances.
 fn verify(space: &StateSpace, modes: &[Mode]) -> Result<(), ModalError> {
     let order = space.order();
     let fastest = modes.iter().map(|mode| mode.lambda.norm()).fold(0.0, f64::max);
@@ -152,17 +169,22 @@ fn verify(space: &StateSpace, modes: &[Mode]) -> Result<(), ModalError> {
     let apart = (modes.len() / 8).max(3);
     let beside = modes.iter().step_by(apart).map(|mode| Complex::new(2.3, mode.lambda.im));
     let decades = (1..=6).map(|k| Complex::new(0.0, fastest * 10_f64.powi(-k)));
+    let inputs = DMatrix::from_fn(order, 2, |i, j| Complex::from((1.3 * (i + 1) as f64 + j as f64).sin()));
+    let excited: Vec<_> = modes
+        .iter()
+        .map(|mode| (mode.left.tr_mul(&inputs), mode.left.conjugate().tr_mul(&inputs)))
+        .collect();
     let mut worst = 0.0_f64;
     for s in beside.chain(decades) {
         let shifted = DMatrix::from_fn(order, order, |i, j| {
             Complex::from(-space.a[(i, j)]) + if i == j { s } else { Complex::ZERO }
         });
-        let Some(direct) = shifted.try_inverse() else { continue };
-        let mut sum = DMatrix::zeros(order, order);
-        for mode in modes {
-            sum += &mode.right * mode.left.transpose() * (0.5 * mode.weight / (s - mode.lambda));
-            let (right, left) = (mode.right.conjugate(), mode.left.conjugate());
-            sum += right * left.transpose() * (0.5 * mode.weight / (s - mode.lambda.conj()));
+        let Some(direct) = shifted.lu().solve(&inputs) else { continue };
+        let mut sum = DMatrix::zeros(order, 2);
+        for (mode, (excited, of_conjugate)) in modes.iter().zip(&excited) {
+            let half = Complex::from(0.5 * mode.weight);
+            sum.gemm(half / (s - mode.lambda), &mode.right, excited, Complex::ONE);
+            sum.gemm(half / (s - mode.lambda.conj()), &mode.right.conjugate(), of_conjugate, Complex::ONE);
         }
         let largest = direct.iter().map(|v| v.norm()).fold(0.0, f64::max);
         let deviation = (&sum - &direct).iter().map(|v| v.norm()).fold(0.0, f64::max) / largest;
