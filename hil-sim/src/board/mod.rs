@@ -79,7 +79,7 @@ impl VirtualBoard {
     pub fn start(rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), BoardError> {
         let config = match rig_toml {
             Some(text) => RigConfig::from_toml(text)?,
-            None => RigConfig::default(),
+            None => RigConfig::elastic(),
         };
         Self::start_with(&config, &Options { seed, ..Options::default() })
     }

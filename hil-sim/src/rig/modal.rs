@@ -170,10 +170,8 @@ fn verify(space: &StateSpace, modes: &[Mode]) -> Result<(), ModalError> {
     let beside = modes.iter().step_by(apart).map(|mode| Complex::new(2.3, mode.lambda.im));
     let decades = (1..=6).map(|k| Complex::new(0.0, fastest * 10_f64.powi(-k)));
     let inputs = DMatrix::from_fn(order, 2, |i, j| Complex::from((1.3 * (i + 1) as f64 + j as f64).sin()));
-    let excited: Vec<_> = modes
-        .iter()
-        .map(|mode| (mode.left.tr_mul(&inputs), mode.left.conjugate().tr_mul(&inputs)))
-        .collect();
+    let excited: Vec<_> =
+        modes.iter().map(|mode| (mode.left.tr_mul(&inputs), mode.left.conjugate().tr_mul(&inputs))).collect();
     let mut worst = 0.0_f64;
     for s in beside.chain(decades) {
         let shifted = DMatrix::from_fn(order, order, |i, j| {

@@ -45,7 +45,7 @@ impl Sim {
             ),
             None => None,
         };
-        let config = text.map_or_else(|| Ok(RigConfig::default()), |text| RigConfig::from_toml(&text));
+        let config = text.map_or_else(|| Ok(RigConfig::elastic()), |text| RigConfig::from_toml(&text));
         let config = config.map_err(|error| open(error.to_string()))?;
         let options = Options { seed, ..Options::default() };
         let (board, link) =

@@ -32,7 +32,7 @@ fn hits_of_another_structure_are_refused_or_accepted_and_told() {
     let more = folder.path().join("more.toml");
     std::fs::write(&more, SMALL.replace("wanted = 2", "wanted = 3")).unwrap();
     let heavier = folder.path().join("heavier.toml");
-    let mut rig = RigConfig::default();
+    let mut rig = RigConfig::elastic();
     rig.bodies.arm_a.mass_kg *= 1.1;
     std::fs::write(&heavier, rig.to_toml()).unwrap();
     let heavier = format!("sim:{}", heavier.display());

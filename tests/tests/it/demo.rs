@@ -25,11 +25,11 @@ fn sliding_stiffness(results: &Value, method: &str) -> f64 {
     row["stiffness_n_per_m"]["z"]["mean"].as_f64().unwrap() * 1e-6
 }
 
-/// Clamp and contact are in series on the default rig: substructuring finds 26.8 N/µm there for a
-/// contact of 180, and the results must state that this is not k_T. The range 22 to 31 allows for
-/// position errors of 0.5 mm and 2°.
+/// Clamp (29.4 N/µm with the bending of specimen and arms) and contact are in series on the
+/// simulated rig: substructuring should find 25.3 N/µm there for a contact of 180, and the results
+/// must state that this is not k_T. The range 22 to 31 allows for position errors of 0.5 mm and 2°.
 #[test]
-fn the_default_rig_shows_clamp_and_contact_in_series() {
+fn the_simulated_rig_shows_clamp_and_contact_in_series() {
     let folder = tempfile::tempdir().unwrap();
     let results = demo(folder.path(), &[]);
     let k = sliding_stiffness(&results, "internal");
@@ -39,7 +39,7 @@ fn the_default_rig_shows_clamp_and_contact_in_series() {
     assert_eq!(series["ok"], false, "{series}");
     let [low, high] =
         ["low", "high"].map(|end| series[format!("series_stiffness_{end}_n_per_m")].as_f64().unwrap());
-    assert!(low < 31.2e6 && 31.2e6 < high, "{series}");
+    assert!(low < 29.4e6 && 29.4e6 < high, "{series}");
     // A and B are coupled only by the contact, and position errors must not be reported as a
     // coupling
     let coupled = checks.iter().find(|check| check["name"] == "back-coupling").unwrap();

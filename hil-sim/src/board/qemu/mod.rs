@@ -79,7 +79,7 @@ impl QemuBoard {
     pub fn start(image: &Path, rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), QemuError> {
         let config = match rig_toml {
             Some(text) => RigConfig::from_toml(text)?,
-            None => RigConfig::default(),
+            None => RigConfig::elastic(),
         };
         Self::start_with(image, &config, &Options { seed, ..Options::default() })
     }

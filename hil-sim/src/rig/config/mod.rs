@@ -1,6 +1,6 @@
 //! The parameters of a rig: the contents of a rig TOML file, table by table.
 //!
-//! `rigs/default.toml` is the built-in default and defines every default value;
+//! `rigs/default.toml` defines every default value;
 //! [`RigConfig::default`] reads the embedded copy. A user's file states any subset: its tables
 //! merge into the default's, its lists replace the default's lists.
 
@@ -16,8 +16,11 @@ pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
 mod check;
 mod own_structure;
 
-/// The built-in default rig, as text.
+/// The rig with rigid bodies from which every rig file starts.
 pub const DEFAULT_TOML: &str = include_str!("../../../rigs/default.toml");
+
+/// The rig of a device without a rig file: `rigs/elastic.toml`.
+pub const ELASTIC_TOML: &str = include_str!("../../../rigs/elastic.toml");
 
 /// Everything that describes one rig. SI units; axes and origin as in [`crate::rig`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -156,6 +159,13 @@ impl RigConfig {
     /// [`RigError::Field`] naming the first invalid field.
     pub fn check(&self) -> Result<(), RigError> {
         check::check(self)
+    }
+}
+
+impl RigConfig {
+    /// The rig of a device without a rig file: the default one with specimens and arms of steel.
+    pub fn elastic() -> Self {
+        check::read(ELASTIC_TOML).expect("rigs/elastic.toml is a valid rig: a test reads it")
     }
 }
 
