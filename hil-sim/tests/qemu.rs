@@ -37,7 +37,7 @@ fn the_binary_gives_the_native_boards_records_sample_for_sample() {
     let Some((emulated, mut host)) = board(11) else { return };
     let in_qemu = host.three_shots(false);
     let options = Options { seed: 11, ..Options::default() };
-    let (native, link) = VirtualBoard::start_with(&RigConfig::default(), &options).unwrap();
+    let (native, link) = VirtualBoard::start_with(&RigConfig::elastic(), &options).unwrap();
     let natively = SmallHost::new(link).three_shots(false);
     assert_eq!(in_qemu, natively);
     assert_eq!(emulated.controls().coil_pulses_us(), native.controls().coil_pulses_us());

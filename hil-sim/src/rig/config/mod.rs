@@ -164,6 +164,9 @@ impl RigConfig {
 
 impl RigConfig {
     /// The rig of a device without a rig file: the default one with specimens and arms of steel.
+    ///
+    /// # Panics
+    /// Never: a test reads the embedded file.
     pub fn elastic() -> Self {
         check::read(ELASTIC_TOML).expect("rigs/elastic.toml is a valid rig: a test reads it")
     }
