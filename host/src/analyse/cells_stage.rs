@@ -10,6 +10,7 @@ use super::cell::{CellName, Hit, Measurements};
 use super::impact_loops;
 use super::impact_loops::ImpactLoop;
 use super::missing::Missing;
+use crate::hysteresis::contact_drift::{ContactDrift, TimedCell};
 use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSignals};
 use crate::results::MAIN_BAND;
 use crate::spectra::{Pulse, SpectraError, Summing, Windowing};
@@ -215,6 +216,8 @@ impl<'a> HitSpectra<'a> {
 pub struct HitAtContact {
     /// Its cell: hits of one cell share place, aim and direction.
     pub cell: CellName,
+    /// The record's id in the campaign file: records are stored in the order of their hits.
+    pub record: i64,
     /// T, v_A and v_B.
     pub response: HitResponse,
 }
@@ -229,7 +232,21 @@ pub fn of_hit(cell: &CellName, fs_hz: f64, hit: &Hit) -> Option<HitAtContact> {
         contact: [&signals.tangential_n, &signals.specimen_a_m_per_s, &signals.specimen_b_m_per_s],
         delay_s: [delays.load_cells, delays.specimen_a, delays.specimen_b],
     })?;
-    Some(HitAtContact { cell: cell.clone(), response })
+    Some(HitAtContact { cell: cell.clone(), record: hit.record, response })
+}
+
+/// Whether the contact changed from the first hits to the last; they must be ordered by cell. `None`
+/// with too few.
+pub fn drift_of_the_contact(hits: &[HitAtContact]) -> Option<ContactDrift> {
+    let cells: Vec<TimedCell<'_>> = hits
+        .chunk_by(|a, b| a.cell == b.cell)
+        .map(|own| TimedCell {
+            impact: &own[0].cell.impact,
+            at: own.iter().map(|hit| hit.record as f64).sum::<f64>() / own.len() as f64,
+            hits: own.iter().map(|hit| &hit.response).collect(),
+        })
+        .collect();
+    ContactDrift::of(&cells)
 }
 
 /// The verdict from all hits; they must be ordered by cell.

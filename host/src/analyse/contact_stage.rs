@@ -4,7 +4,7 @@
 
 use super::averages::CellAverage;
 use super::cell::Measurements;
-use super::cells_stage::{Cells, slip_under_the_hammer};
+use super::cells_stage::{Cells, drift_of_the_contact, slip_under_the_hammer};
 use super::checks::contact_change::ContactChange;
 use super::checks::{HiddenResonance, SensorMasses, SeriesCompliance, at_the_specimens};
 use super::impact_loops::{ImpactLoop, ImpactLoops};
@@ -14,6 +14,7 @@ use super::{chosen, impact_loops, shaker_levels};
 use crate::contact::{ContactError, Joint, Known, Stiffness};
 use crate::hysteresis::Correction;
 use crate::hysteresis::compliance::{ContactCompliance, SEARCH_HZ};
+use crate::hysteresis::contact_drift::ContactDrift;
 use crate::hysteresis::hammer_slip::HammerSlip;
 use crate::hysteresis::static_arm::{CorrectionSource, Identified, from_known_force, from_levels};
 use crate::results::{Backbone, FrfCurve, LoopCurve, Reconstruction, Role, ShakerLoop, rounded};
@@ -43,6 +44,8 @@ pub struct Contact {
     pub arm: Option<Identified>,
     /// Whether the contact slips under the hammer.
     pub slip: HammerSlip,
+    /// Whether it changed during the hits; `None` with too few cells.
+    pub drift: Option<ContactDrift>,
     /// The loops of the impacts.
     pub impacts: Option<ImpactLoops>,
     /// The one with the median slope.
@@ -124,6 +127,7 @@ pub fn at_the_contact<M: Measurements>(
         hidden,
         arm,
         slip,
+        drift: drift_of_the_contact(&cells.at_contact),
         impacts,
         example_loop,
         reconstruction,

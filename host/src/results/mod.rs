@@ -255,6 +255,8 @@ pub const SERIES_COMPLIANCE: &str = "series-compliance";
 pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
 /// Name of the check on slip under the hammer.
 pub const HAMMER_SLIP: &str = "hammer-slip";
+/// Name of the check that the contact is the same in all hits.
+pub const STEADY: &str = "contact-steady";
 /// Name of the check on wear.
 pub const UNCHANGED: &str = "contact-unchanged";
 /// Name of the check on the masses of fixed sensors.

@@ -88,6 +88,19 @@ fn rigs_not_used_in_development() {
     println!("contradictions named although all is as stated: {named} of {}", all.len());
 }
 
+#[test]
+fn a_contact_that_changes_while_it_is_hit_is_noticed() {
+    let check = |drift: f64| {
+        let mut rig = RigConfig::elastic();
+        rig.contact.drift_per_hit = drift / 134.0;
+        results(1, &rig, &contact_plan(&rig)).check("contact-steady").unwrap().clone()
+    };
+    let drifts = check(0.1);
+    assert_eq!(drifts.ok, Some(false), "{}", drifts.meaning);
+    let steady = check(0.0);
+    assert_ne!(steady.ok, Some(false), "{}", steady.meaning);
+}
+
 /// A false assumption: its name, what makes it false on the i-th of its rigs, and what the answer
 /// must say of it.
 type False = (&'static str, fn(&mut RigConfig, usize), &'static [&'static str]);

@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 
 /// Bands in which responses are compared, Hz; within each, the lines are weighted by their
 /// strength.
-const BANDS_HZ: [[f64; 2]; 4] = [[60.0, 150.0], [150.0, 250.0], [250.0, 400.0], [400.0, 700.0]];
+pub const BANDS_HZ: [[f64; 2]; 4] = [[60.0, 150.0], [150.0, 250.0], [250.0, 400.0], [400.0, 700.0]];
 
 /// T, v_A, v_B, and v_A − v_B: slip shows first in the last one.
 const SIGNALS: usize = 4;

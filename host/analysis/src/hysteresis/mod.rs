@@ -22,6 +22,7 @@ use serde::Serialize;
 pub mod analyse;
 pub mod backbone;
 pub mod compliance;
+pub mod contact_drift;
 pub mod cycles;
 mod frequency;
 pub mod hammer_slip;

@@ -10,7 +10,7 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::Interval;
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Joint, ONE_STRUCTURE,
-    Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, UNCHANGED, headline_rank,
+    Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED, headline_rank,
 };
 use crate::substructuring::{Dof, fit};
 
@@ -113,6 +113,7 @@ pub fn failed(check: &Check) -> String {
             "A sensor on B was measured on B alone or in the assembly, but not in both: its mass changes k_T."
                 .into()
         }
+        STEADY => "The contact changed while it was hit: k_T is a mean over that time.".into(),
         UNCHANGED => "The contact is not the same after the hits as before.".into(),
         INTERFACE_MODES => "Six rigid motions do not describe what couples the parts.".into(),
         INTERNALS => "The points away from the interface do not suffice for every method.".into(),

@@ -8,15 +8,17 @@ use crate::analyse::checks::{
     SeriesCompliance, Sizes, rigid_motions_suffice,
 };
 use crate::hysteresis::compliance::ImaginaryPeak;
+use crate::hysteresis::contact_drift::ContactDrift;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
 use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
 use crate::results::{
     BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE,
-    SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, UNCHANGED,
+    SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED,
 };
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
 use crate::substructuring::identify::Internals;
+use crate::substructuring::joint_over_bands::NORMAL_95;
 
 /// All checks that were made.
 pub fn all(found: &Findings) -> Vec<Check> {
@@ -32,6 +34,7 @@ pub fn all(found: &Findings) -> Vec<Check> {
         checks.push(series_compliance(&contact.series));
         checks.push(hidden_resonance(&contact.hidden));
         checks.push(hammer_slip(&contact.slip));
+        checks.extend(contact.drift.as_ref().map(contact_drift));
         checks.extend(contact.change.as_ref().map(contact_change));
         checks.extend(contact.masses.as_ref().map(sensor_masses));
     }
@@ -352,6 +355,28 @@ fn phases(split: &PhaseSplit) -> String {
         degrees(split.b),
         degrees(split.arms)
     )
+}
+
+/// Whether the contact's stiffness changed from the first hits on A to the last.
+fn contact_drift(found: &ContactDrift) -> Check {
+    let ContactDrift { change, std, cells } = *found;
+    let [percent, half] = [100.0 * change, 100.0 * NORMAL_95 * std].map(|value| decimals(value, 1));
+    let meaning = match found.found() {
+        Some(true) => format!(
+            "The contact changed between the first and the last hits on A: T over the displacement between the spots changed by {percent} ± {half} %. k_T is a \
+             mean over that time, and its interval does not contain the change. Look for wear, for a normal load that relaxes, and for temperature."
+        ),
+        Some(false) => format!(
+            "The contact is the same in the first and the last hits on A: T over the displacement between the spots changed by {percent} ± {half} % over {cells} cells."
+        ),
+        None => format!(
+            "It is not clear whether the contact changed between the first and the last hits on A: T over the displacement between the spots changed by \
+             {percent} ± {half} % over {cells} cells."
+        ),
+    };
+    Check::new(STEADY, found.found().map(|changed| !changed), meaning)
+        .with("change_percent", 100.0 * change)
+        .with("change_std_percent", 100.0 * std)
 }
 
 fn contact_change(found: &ContactChange) -> Check {
