@@ -264,7 +264,7 @@ impl Servo {
         let step = logarithm(drive_v / last_v);
         let ness = (logarithm(glance / amplitude.max(f32::MIN_POSITIVE)) / step).clamp(1.0, STEEPEST);
         let longest = self.steep.map_or(STRIDE, |steep| steep.longest);
-        Some(Steep { ness, stride: SHORTER * step, longest, edge_v: last_v })
+        Some(Steep { ness, stride: (SHORTER * step).min(longest), longest, edge_v: last_v })
     }
 
     /// Returns from above the ceiling: the required drive.
@@ -276,6 +276,9 @@ impl Servo {
         self.beyond += 1;
         if self.beyond > GLANCES {
             return Err(Trouble::Runaway);
+        }
+        if let Some(steep) = self.steep.as_mut().filter(|_| self.beyond == 1) {
+            steep.longest = (0.5 * steep.longest).max(LEAST_STRIDE);
         }
         if let Some(steep) = self.step(glance, drive_v) {
             self.steep = Some(steep);
@@ -290,9 +293,8 @@ impl Servo {
         let back = (logarithm(glance / self.target) / ness).max(stride).min(longest);
         // while the amplitude stays above the ceiling, further each time
         let back_v = drive_v * exponential(-(back * f32::from(self.beyond)).min(STRIDE));
-        let longest = if self.beyond == 1 { (0.5 * longest).max(LEAST_STRIDE) } else { longest };
         self.last = None;
-        self.steep = Some(Steep { ness, stride: back.min(longest), longest, edge_v: back_v });
+        self.steep = Some(Steep { ness, stride: back, longest, edge_v: back_v });
         Ok(back_v)
     }
 

@@ -154,7 +154,7 @@ fn serve_image(
     use jointrig_hil_sim::board::Options;
     use jointrig_hil_sim::board::qemu::QemuBoard;
 
-    let config = rig.map_or_else(|| Ok(RigConfig::elastic()), RigConfig::from_toml)?;
+    let config = RigConfig::of_device(rig)?;
     let uart = Some(format!("tcp:{address},server=on,wait=off"));
     let options = Options { seed, uart, ..Options::default() };
     let (board, mut link) = QemuBoard::start_with(image, &config, &options)?;

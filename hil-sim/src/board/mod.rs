@@ -77,10 +77,7 @@ impl VirtualBoard {
     /// # Errors
     /// [`BoardError`] with the invalid line and field.
     pub fn start(rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), BoardError> {
-        let config = match rig_toml {
-            Some(text) => RigConfig::from_toml(text)?,
-            None => RigConfig::elastic(),
-        };
+        let config = RigConfig::of_device(rig_toml)?;
         Self::start_with(&config, &Options { seed, ..Options::default() })
     }
 

@@ -160,8 +160,8 @@ fn invert(modes: &mut [Mode], order: usize) -> Result<(), ModalError> {
     Ok(())
 }
 
-/// Compares (s − A)⁻¹ b from the modes with a direct solve, for two fixed b that excite every state,
-/// at, near and far from the resonances.
+/// Compares (s − A)⁻¹ b from the modes with a direct solve, for two fixed b that excite every
+/// state, at, near and far from the resonances.
 fn verify(space: &StateSpace, modes: &[Mode]) -> Result<(), ModalError> {
     let order = space.order();
     let fastest = modes.iter().map(|mode| mode.lambda.norm()).fold(0.0, f64::max);

@@ -10,7 +10,7 @@ use super::cell::{CellName, Hit, Measurements};
 use super::impact_loops;
 use super::impact_loops::ImpactLoop;
 use super::missing::Missing;
-use crate::hysteresis::contact_drift::{ContactDrift, TimedCell};
+use crate::hysteresis::contact_drift::ContactDrift;
 use crate::hysteresis::hammer_slip::{CellHits, HammerSlip, HitResponse, HitSignals};
 use crate::results::MAIN_BAND;
 use crate::spectra::{Pulse, SpectraError, Summing, Windowing};
@@ -235,25 +235,24 @@ pub fn of_hit(cell: &CellName, fs_hz: f64, hit: &Hit) -> Option<HitAtContact> {
     Some(HitAtContact { cell: cell.clone(), record: hit.record, response })
 }
 
-/// Whether the contact changed from the first hits to the last; they must be ordered by cell. `None`
-/// with too few.
+/// Whether the contact changed from the first hits to the last; they must be ordered by cell.
+/// `None` with too few.
 pub fn drift_of_the_contact(hits: &[HitAtContact]) -> Option<ContactDrift> {
-    let cells: Vec<TimedCell<'_>> = hits
-        .chunk_by(|a, b| a.cell == b.cell)
-        .map(|own| TimedCell {
-            impact: &own[0].cell.impact,
-            at: own.iter().map(|hit| hit.record as f64).sum::<f64>() / own.len() as f64,
-            hits: own.iter().map(|hit| &hit.response).collect(),
-        })
-        .collect();
+    let at = |own: &[HitAtContact]| own.iter().map(|hit| hit.record as f64).sum::<f64>() / own.len() as f64;
+    let cells: Vec<(f64, CellHits<'_>)> = in_cells(hits).map(|own| (at(own), together(own))).collect();
     ContactDrift::of(&cells)
 }
 
 /// The verdict from all hits; they must be ordered by cell.
 pub fn slip_under_the_hammer(hits: &[HitAtContact]) -> HammerSlip {
-    let cells: Vec<CellHits<'_>> = hits
-        .chunk_by(|a, b| a.cell == b.cell)
-        .map(|own| CellHits { impact: &own[0].cell.impact, hits: own.iter().map(|h| &h.response).collect() })
-        .collect();
+    let cells: Vec<CellHits<'_>> = in_cells(hits).map(together).collect();
     HammerSlip::of(&cells)
+}
+
+fn in_cells(hits: &[HitAtContact]) -> impl Iterator<Item = &[HitAtContact]> {
+    hits.chunk_by(|a, b| a.cell == b.cell)
+}
+
+fn together(cell: &[HitAtContact]) -> CellHits<'_> {
+    CellHits { impact: &cell[0].cell.impact, hits: cell.iter().map(|hit| &hit.response).collect() }
 }

@@ -290,8 +290,8 @@ mod tests {
     use super::*;
     use crate::campaign::plan::{CONTACT, CONTACT_BY_HAND};
 
-    /// With all sensors of side B on its arm, k_T includes specimen B: 10 mm of steel, 18 × 14 mm, in
-    /// shear and bending (1040 N/µm) in series with 180 N/µm.
+    /// With all sensors of side B on its arm, k_T includes specimen B: 10 mm of steel, 18 × 14 mm,
+    /// in shear and bending (1040 N/µm) in series with 180 N/µm.
     const WITH_SPECIMEN_B: f64 = 153e6;
 
     /// Relative half width at 180 N/µm, where this stiffness is to be found.

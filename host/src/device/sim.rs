@@ -45,8 +45,7 @@ impl Sim {
             ),
             None => None,
         };
-        let config = text.map_or_else(|| Ok(RigConfig::elastic()), |text| RigConfig::from_toml(&text));
-        let config = config.map_err(|error| open(error.to_string()))?;
+        let config = RigConfig::of_device(text.as_deref()).map_err(|error| open(error.to_string()))?;
         let options = Options { seed, ..Options::default() };
         let (board, link) =
             VirtualBoard::start_with(&config, &options).map_err(|error| open(error.to_string()))?;

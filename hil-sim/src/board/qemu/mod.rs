@@ -77,10 +77,7 @@ impl QemuBoard {
     /// # Errors
     /// [`QemuError`], which states what to do.
     pub fn start(image: &Path, rig_toml: Option<&str>, seed: u64) -> Result<(Self, HostEnd), QemuError> {
-        let config = match rig_toml {
-            Some(text) => RigConfig::from_toml(text)?,
-            None => RigConfig::elastic(),
-        };
+        let config = RigConfig::of_device(rig_toml)?;
         Self::start_with(image, &config, &Options { seed, ..Options::default() })
     }
 

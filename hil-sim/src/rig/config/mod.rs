@@ -160,10 +160,16 @@ impl RigConfig {
     pub fn check(&self) -> Result<(), RigError> {
         check::check(self)
     }
-}
 
-impl RigConfig {
-    /// The rig of a device without a rig file: the default one with specimens and arms of steel.
+    /// The rig of a device: that of its rig file, or [`RigConfig::elastic`] without one.
+    ///
+    /// # Errors
+    /// As [`RigConfig::from_toml`].
+    pub fn of_device(rig_toml: Option<&str>) -> Result<Self, RigError> {
+        rig_toml.map_or_else(|| Ok(Self::elastic()), Self::from_toml)
+    }
+
+    /// The default rig with specimens and arms of steel that bend.
     ///
     /// # Panics
     /// Never: a test reads the embedded file.

@@ -10,7 +10,7 @@
 //! structure and no position is needed; but near a resonance of a specimen the ratio can change by
 //! more or less than the contact, and with the other sign.
 
-use super::hammer_slip::{BANDS_HZ, HitResponse};
+use super::hammer_slip::{BANDS_HZ, CellHits, HitResponse, SIGMA_PER_S};
 use num_complex::Complex;
 use std::f64::consts::TAU;
 
@@ -28,17 +28,6 @@ const MUCH: f64 = 0.01;
 /// deviations: it is less than the interval of k_T.
 const CLEAR: f64 = 0.02;
 
-/// The hits of one cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TimedCell<'a> {
-    /// The impact's name.
-    pub impact: &'a str,
-    /// When they were struck, on average, in any unit.
-    pub at: f64,
-    /// Its kept hits, with lines alike.
-    pub hits: Vec<&'a HitResponse>,
-}
-
 /// Change of T over the spots' displacement over the hits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactDrift {
@@ -51,17 +40,18 @@ pub struct ContactDrift {
 }
 
 impl ContactDrift {
-    /// From all cells whose hits move the contact; `None` if no place of impact has enough.
-    pub fn of(cells: &[TimedCell<'_>]) -> Option<Self> {
-        let mut impacts: Vec<Vec<&TimedCell<'_>>> = Vec::new();
+    /// From all cells whose hits move the contact, each with the time at which it was struck, in
+    /// any unit; `None` if no place of impact has enough.
+    pub fn of(cells: &[(f64, CellHits<'_>)]) -> Option<Self> {
+        let mut impacts: Vec<Vec<&(f64, CellHits<'_>)>> = Vec::new();
         for cell in cells {
-            match impacts.iter_mut().find(|own| own[0].impact == cell.impact) {
+            match impacts.iter_mut().find(|own| own[0].1.impact == cell.1.impact) {
                 Some(own) => own.push(cell),
                 None => impacts.push(vec![cell]),
             }
         }
         impacts.retain(|own| own.len() >= FEWEST_CELLS);
-        let times = || impacts.iter().flatten().map(|cell| cell.at);
+        let times = || impacts.iter().flatten().map(|(at, _)| *at);
         let duration = times().fold(f64::NEG_INFINITY, f64::max) - times().fold(f64::INFINITY, f64::min);
         let of_band = |band| {
             let trends: Vec<Trend> = impacts.iter().map(|own| Trend::of(own, band)).collect();
@@ -99,13 +89,14 @@ struct Trend {
 }
 
 impl Trend {
-    fn of(cells: &[&TimedCell<'_>], band: [f64; 2]) -> Self {
-        let stiffness: Vec<Complex<f64>> = cells.iter().map(|cell| at_the_spots(&cell.hits, band)).collect();
+    fn of(cells: &[&(f64, CellHits<'_>)], band: [f64; 2]) -> Self {
+        let stiffness: Vec<Complex<f64>> =
+            cells.iter().map(|(_, cell)| at_the_spots(&cell.hits, band)).collect();
         let count = cells.len() as f64;
         let mean = stiffness.iter().sum::<Complex<f64>>() / count;
-        let middle = cells.iter().map(|cell| cell.at).sum::<f64>() / count;
+        let middle = cells.iter().map(|(at, _)| at).sum::<f64>() / count;
         let points: Vec<[f64; 2]> =
-            cells.iter().zip(&stiffness).map(|(cell, k)| [cell.at - middle, (k / mean - 1.0).re]).collect();
+            cells.iter().zip(&stiffness).map(|((at, _), k)| [at - middle, (k / mean - 1.0).re]).collect();
         let squares: f64 = points.iter().map(|[t, _]| t * t).sum();
         let slope = points.iter().map(|[t, y]| t * y).sum::<f64>() / squares;
         let rest: f64 = points.iter().map(|[t, y]| (y - slope * t).powi(2)).sum();
@@ -114,17 +105,14 @@ impl Trend {
 }
 
 /// T over the displacement of spot A relative to spot B, least squares over hits and lines.
-fn at_the_spots(hits: &[&HitResponse], [low, high]: [f64; 2]) -> Complex<f64> {
+fn at_the_spots(hits: &[&HitResponse], band: [f64; 2]) -> Complex<f64> {
     let (mut product, mut square) = (Complex::default(), 0.0);
     for hit in hits {
         let [t, v_a, v_b] = &hit.per_newton;
-        for l in 0..t.len() {
-            let frequency_hz = hit.first_hz + hit.step_hz * l as f64;
-            if !(low..high).contains(&frequency_hz) {
-                continue;
-            }
-            let moved = (v_a[l] - v_b[l]) / Complex::new(0.0, TAU * frequency_hz);
-            product += t[l] * moved.conj();
+        for line in hit.lines(band) {
+            let s = Complex::new(SIGMA_PER_S, TAU * hit.frequency_hz(line));
+            let moved = (v_a[line] - v_b[line]) / s;
+            product += t[line] * moved.conj();
             square += moved.norm_sqr();
         }
     }
@@ -156,7 +144,8 @@ mod tests {
                     per_newton: {
                         let moved: Vec<Complex<f64>> =
                             (0..300).map(|l| Complex::new(1e-9, f64::from(l % 7 + impact) * 1e-10)).collect();
-                        let speed = |l: usize| moved[l] * Complex::new(0.0, TAU * (60.0 + 2.0 * l as f64));
+                        let speed =
+                            |l: usize| moved[l] * Complex::new(SIGMA_PER_S, TAU * (60.0 + 2.0 * l as f64));
                         [
                             moved.iter().map(|x| x * stiffness).collect(),
                             (0..300).map(speed).collect(),
@@ -169,12 +158,12 @@ mod tests {
             .collect()
     }
 
-    fn drift(cells: &[(String, f64, Vec<HitResponse>)]) -> ContactDrift {
-        let cells: Vec<TimedCell<'_>> = cells
+    fn drift(cells: &[(String, f64, Vec<HitResponse>)]) -> Option<ContactDrift> {
+        let cells: Vec<(f64, CellHits<'_>)> = cells
             .iter()
-            .map(|(impact, at, hits)| TimedCell { impact, at: *at, hits: hits.iter().collect() })
+            .map(|(impact, at, hits)| (*at, CellHits { impact, hits: hits.iter().collect() }))
             .collect();
-        ContactDrift::of(&cells).expect("enough cells")
+        ContactDrift::of(&cells)
     }
 
     #[test]
@@ -182,10 +171,10 @@ mod tests {
         let mut squares = 0.0;
         for seed in 0..200 {
             // within a place of impact, only a quarter of the change is seen
-            let found = drift(&campaign(seed, 0.06, 2e-3));
+            let found = drift(&campaign(seed, 0.06, 2e-3)).expect("enough cells");
             assert_eq!(found.found(), Some(true), "{found:?}");
             assert!((found.change - 0.06).abs() < 5.0 * found.std, "{found:?}");
-            let none = drift(&campaign(1000 + seed, 0.0, 2e-3));
+            let none = drift(&campaign(1000 + seed, 0.0, 2e-3)).expect("enough cells");
             assert_ne!(none.found(), Some(true), "{none:?}");
             squares += (none.change / none.std).powi(2);
         }
@@ -196,12 +185,8 @@ mod tests {
 
     #[test]
     fn few_cells_and_large_scatter_are_not_clear() {
-        assert_eq!(drift(&campaign(1, 0.0, 0.05)).found(), None);
+        assert_eq!(drift(&campaign(1, 0.0, 0.05)).expect("enough cells").found(), None);
         let few: Vec<_> = campaign(1, 0.0, 1e-3).into_iter().step_by(4).collect();
-        let cells: Vec<TimedCell<'_>> = few
-            .iter()
-            .map(|(impact, at, hits)| TimedCell { impact, at: *at, hits: hits.iter().collect() })
-            .collect();
-        assert_eq!(ContactDrift::of(&cells), None);
+        assert_eq!(drift(&few), None);
     }
 }

@@ -300,15 +300,8 @@ fn alike<'a>(hits: &[&'a HitResponse]) -> Vec<&'a HitResponse> {
 /// on the `usual` response at this impact, normalised by it. The usual response comes from hits of
 /// other cells: otherwise a hit's own noise, which is larger per newton the softer the hit, would
 /// look like slip.
-fn apart(
-    hits: &[&HitResponse],
-    usual: &[&HitResponse],
-    signal: usize,
-    [low, high]: [f64; 2],
-) -> Vec<Complex<f64>> {
-    let first = hits[0];
-    let inside = (0..first.per_newton[0].len())
-        .filter(|l| (low..high).contains(&(first.first_hz + first.step_hz * *l as f64)));
+fn apart(hits: &[&HitResponse], usual: &[&HitResponse], signal: usize, band: [f64; 2]) -> Vec<Complex<f64>> {
+    let inside = hits[0].lines(band);
     let value = |hit: &HitResponse, l: usize| match signal {
         3 => hit.per_newton[1][l] - hit.per_newton[2][l],
         own => hit.per_newton[own][l],
@@ -340,7 +333,7 @@ const LEAD_S: f64 = 2e-3;
 
 /// Decay rate of the exponential window, 1/s: what remains at the truncated end is small, and the
 /// same fraction for every hit.
-const SIGMA_PER_S: f64 = 8.0;
+pub const SIGMA_PER_S: f64 = 8.0;
 
 /// T, v_A and v_B.
 pub const CONTACT_SIGNALS: usize = 3;
@@ -376,6 +369,16 @@ pub struct HitResponse {
 }
 
 impl HitResponse {
+    /// Frequency of a line, Hz.
+    pub fn frequency_hz(&self, line: usize) -> f64 {
+        self.first_hz + self.step_hz * line as f64
+    }
+
+    /// The lines within a band, Hz.
+    pub fn lines(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = usize> {
+        (0..self.per_newton[0].len()).filter(move |line| (low..high).contains(&self.frequency_hz(*line)))
+    }
+
     /// From one hit; `None` without a pulse, or if the signals differ in length.
     pub fn of(signals: &HitSignals<'_>) -> Option<Self> {
         let HitSignals { fs_hz, hammer_n, contact, delay_s } = *signals;
