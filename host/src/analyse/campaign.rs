@@ -90,8 +90,14 @@ pub fn analyse_measurements<M: Measurements>(
     let fitted: Vec<_> = fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
     let rows = substructured.iter().flat_map(|s| &s.rows).map(|row| &row.joint).chain(&fitted);
     let fbs = between_the_arms(&recommended.estimates, rows);
-    let (contact, absent) = contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
+    let (mut contact, absent) =
+        contact_stage::at_the_contact(measurements, &cells, fbs.as_ref(), own.as_ref());
     missing.extend(absent);
+    let mut own_stiffness = own.map(|(stiffness, _)| stiffness);
+    if let Some(drift) = contact.drift.filter(|drift| drift.found() == Some(true)) {
+        own_stiffness.iter_mut().for_each(|own| own.allow_for(&drift));
+        contact.joint.iter_mut().for_each(|joint| joint.allow_for(&drift));
+    }
 
     let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
     Findings {
@@ -105,7 +111,7 @@ pub fn analyse_measurements<M: Measurements>(
         recommended: recommended.estimates,
         bootstrap: recommended.bootstrap,
         contact: Some(contact),
-        own_stiffness: Some(own.map(|(stiffness, _)| stiffness)),
+        own_stiffness: Some(own_stiffness),
         between_arms: Some(between_arms),
         missing,
         ..Findings::default()

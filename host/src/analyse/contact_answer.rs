@@ -85,6 +85,7 @@ pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>)
         contact_m: measurements.geometry().virtual_point_b_m,
         spots_m: measurements.spots_m(),
         specimens: measurements.specimens(),
+        parallel_path: measurements.known_contact().parallel_path,
         priors: measurements.contact_priors(),
         band_hz: BAND,
     }

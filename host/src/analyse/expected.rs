@@ -92,6 +92,7 @@ fn one(plan: &Plan, geometry: &Geometry, contact_n_per_m: f64) -> Option<Expecte
         contact_m: geometry.virtual_point_b_m,
         spots_m: spots,
         specimens: plan.known_specimens(),
+        parallel_path: None,
         priors: plan.priors.as_ref().map_or_else(ContactPriors::default, |p| p.get_ref().known()),
         band_hz: BAND,
     };

@@ -90,15 +90,41 @@ fn rigs_not_used_in_development() {
 
 #[test]
 fn a_contact_that_changes_while_it_is_hit_is_noticed() {
-    let check = |number, drift: f64| {
+    let found = |number, drift: f64| {
         let mut rig = RigConfig::elastic();
         rig.contact.drift_per_hit = drift / 134.0;
-        results(number, &rig, &contact_plan(&rig)).check("contact-steady").unwrap().clone()
+        let found = results(number, &rig, &contact_plan(&rig));
+        (found.check("contact-steady").unwrap().clone(), found.answer.unwrap().contact)
     };
-    let drifts = check(1, 0.1);
+    let (drifts, answer) = found(1, 0.1);
     assert_eq!(drifts.ok, Some(false), "{}", drifts.meaning);
-    let steady = check(2, 0.0);
+    assert!(answer.why.contains("The contact changed"), "{}", answer.why);
+    // the interval contains the stiffness before the first hit and after the last
+    let [low, high] = answer.k_t_n_per_m.unwrap().ci95;
+    let first = RigConfig::elastic().truth().contact_k_t_n_per_m;
+    assert!(low < first && high > 1.1 * first, "{low} {high}");
+    let (steady, answer) = found(2, 0.0);
     assert_ne!(steady.ok, Some(false), "{}", steady.meaning);
+    assert!(answer.contradictions.is_empty(), "{}", answer.why);
+}
+
+#[test]
+fn a_hammer_that_contradicts_the_load_cells_is_named_and_allowed_for() {
+    let measured = |number, ratio: f64| {
+        let mut rig = RigConfig::elastic();
+        volts(&mut rig, &["force"], ratio);
+        measured(number, &rig, &rig)
+    };
+    // the load cells would show more force than the hammer gives; then, 25 % more than the plan
+    // states would pass beside them
+    for (number, ratio) in [(3, 0.93), (4, 1.25)] {
+        let found = measured(number, ratio);
+        let answer = answer(&RigConfig::elastic(), &found).expect("a k_T");
+        assert!(answer.covers, "{}: {:?}", found.why, found.k_t_n_per_m);
+        assert!(found.why.contains("hammer's force cell"), "{}", found.why);
+    }
+    let sound = measured(2, 1.0);
+    assert!(sound.contradictions.is_empty(), "{}", sound.why);
 }
 
 /// A false assumption: its name, what makes it false on the i-th of its rigs, and what the answer

@@ -49,7 +49,8 @@ pub struct Contradiction {
     /// The cause under which its uncertainty is listed.
     pub cause: Cause,
     /// By how much it is off, with the standard deviation of that: along x, y and z for a position
-    /// (m), relative for a gain, s for a delay. Empty if a kind is off.
+    /// (m), relative for a gain and for the contact's change, s for a delay. Empty if a kind is
+    /// off.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub off: Vec<[f64; 2]>,
     /// How many times farther than stated the quantities of a kind scatter.
@@ -86,7 +87,7 @@ fn tested(own: &Parameter) -> bool {
         | Cause::Skew
         | Cause::SensorAxes => true,
         Cause::HammerTilt => own.tilted.is_some_and(|[z, _]| z.abs() < ACROSS),
-        Cause::Noise | Cause::Aim | Cause::Bending | Cause::Misfit => false,
+        Cause::Noise | Cause::Aim | Cause::Bending | Cause::Drift | Cause::Misfit => false,
     };
     tested && own.stated && own.sigma.is_finite() && own.sigma > 0.0
 }
@@ -249,6 +250,11 @@ impl Changes {
 }
 
 impl Contradiction {
+    /// Something that is off by this much, each with its standard deviation.
+    pub fn by(what: &str, cause: Cause, off: [f64; 2]) -> Self {
+        Contradiction { off: vec![off], ..Contradiction::new(what, cause) }
+    }
+
     fn new(what: &str, cause: Cause) -> Self {
         Contradiction { what: what.to_owned(), cause, off: Vec::new(), scatter: None, exchanged_with: None }
     }

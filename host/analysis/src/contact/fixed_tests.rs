@@ -139,6 +139,7 @@ fn input<'a>(cells: &'a [Cell], keep: impl Fn(&Cell) -> bool) -> Input<'a> {
         contact_m: [0.0; 3],
         spots_m: None,
         specimens: [Some(Bulk::RIGID); 2],
+        parallel_path: None,
         priors,
         band_hz: BAND,
     }

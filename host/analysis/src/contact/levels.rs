@@ -17,7 +17,7 @@
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
 use super::model::bulk_of_spot;
-use super::outcome::{Interval, Variances, stiffness_of};
+use super::outcome::{FORCE_BALANCE, Interval, Variances, over_time, stiffness_of};
 use super::parameters::{
     CENTRE, COMPLIANCE, Cause, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B,
 };
@@ -25,6 +25,7 @@ use super::{BAND, ContactError, Input, Known, START_M_PER_N, Stiffness};
 use crate::C;
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;
+use crate::hysteresis::contact_drift::ContactDrift;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::parallel::prelude::*;
 use crate::substructuring::geometry::Grouping;
@@ -435,8 +436,21 @@ pub struct Joint {
     pub levels: usize,
 }
 
-/// Averages hits and levels; none if no level narrows the interval of the hits.
+impl Joint {
+    /// As [`Stiffness::allow_for`], whose interval is not narrower.
+    pub fn allow_for(&mut self, drift: &ContactDrift) {
+        if let Some(k_t) = over_time(self.k_t_n_per_m, &mut self.budget, drift) {
+            self.k_t_n_per_m = k_t;
+        }
+    }
+}
+
+/// Averages hits and levels; none if no level narrows the interval of the hits. Nor if the force of
+/// the hits is in doubt, on which the levels depend too.
 pub fn joint(hits: &Stiffness, known: &Known, levels: &[&LevelStiffness]) -> Option<Joint> {
+    if hits.contradictions.iter().any(|one| one.what == FORCE_BALANCE) {
+        return None;
+    }
     let readings: Vec<&Reading> = levels.iter().map(|level| &level.reading).collect();
     let values: Vec<f64> =
         std::iter::once(known.p[COMPLIANCE]).chain(readings.iter().map(|r| r.compliance)).collect();

@@ -166,6 +166,7 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
         contact_m: [0.0; 3],
         spots_m: Some(SPOTS),
         specimens: [Some(Bulk::RIGID); 2],
+        parallel_path: None,
         priors,
         band_hz: BAND,
     }

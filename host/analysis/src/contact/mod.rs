@@ -58,7 +58,9 @@ pub use elastic::Bulk;
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
 };
-pub use outcome::{Diagnosis, Doubt, Farthest, Interval, OfFrequency, SignalResidual, Stiffness};
+pub use outcome::{
+    Diagnosis, Doubt, FORCE_BALANCE, Farthest, Interval, OfFrequency, SignalResidual, Stiffness,
+};
 pub use parameters::{Cause, ContactPriors};
 
 use crate::band::Band;
@@ -95,6 +97,8 @@ pub struct Input<'a> {
     pub spots_m: Option<[[f64; 3]; 2]>,
     /// What the plan states of the bulk of specimens A and B; `None` if nothing.
     pub specimens: [Option<Bulk>; 2],
+    /// Stated stiffness to ground beside the load cells, relative to theirs; `None` if not stated.
+    pub parallel_path: Option<f64>,
     /// Prior knowledge.
     pub priors: ContactPriors,
     /// The band of the lines used.
@@ -241,6 +245,8 @@ struct Fit {
     parameters: Parameters,
     blocks: Vec<Block>,
     solution: Solution,
+    /// Stiffness of the load cells together, about; `None` if no signal shows it.
+    load_cells_n_per_m: Option<f64>,
 }
 
 impl Fit {
@@ -259,6 +265,8 @@ struct Prepared {
     blocks: Vec<Block>,
     /// Damping of the window, 1/s.
     sigma_per_s: f64,
+    /// As for [`Fit`].
+    load_cells_n_per_m: Option<f64>,
 }
 
 impl Prepared {
@@ -284,12 +292,13 @@ impl Prepared {
                 "only {lines} lines of the hits on the assembly have valid values and a known noise in every cell"
             )));
         }
-        scale_form(&mut parameters, &blocks);
+        let load_cells_n_per_m = scale_form(&mut parameters, &blocks);
         if input.includes_specimen_b() {
             // no signal separates it from the contact
             parameters.narrow(TIP_B, 0.0);
         }
-        Ok(Prepared { parameters, blocks, sigma_per_s: input.cells[0].spectra.sigma_per_s() })
+        let sigma_per_s = input.cells[0].spectra.sigma_per_s();
+        Ok(Prepared { parameters, blocks, sigma_per_s, load_cells_n_per_m })
     }
 
     /// The fit with these changes of the priors.
@@ -298,7 +307,7 @@ impl Prepared {
         changes.apply(parameters.all_mut());
         let starts = starts(&parameters);
         let (blocks, solution) = solver::solve(&self.blocks, &parameters, &starts, self.sigma_per_s)?;
-        Ok(Fit { parameters, blocks, solution })
+        Ok(Fit { parameters, blocks, solution, load_cells_n_per_m: self.load_cells_n_per_m })
     }
 }
 
@@ -325,7 +334,8 @@ const LOWEST_HZ: f64 = 250.0;
 
 /// Sets the priors of the form: for z_B these values, for rotations the same times the lever arm of
 /// arm B's points. They keep the form from fitting noise where the hits hardly determine it.
-fn scale_form(parameters: &mut Parameters, blocks: &[Block]) {
+/// Returns the load cells' stiffness K, N/m; `None` if no signal shows it.
+fn scale_form(parameters: &mut Parameters, blocks: &[Block]) -> Option<f64> {
     let mut stiffness: Vec<f64> = Vec::new();
     let mut lever_m: f64 = 0.0;
     let start = |at: usize| parameters.all()[at].start;
@@ -345,13 +355,14 @@ fn scale_form(parameters: &mut Parameters, blocks: &[Block]) {
         }
     }
     stiffness.sort_by(f64::total_cmp);
-    let Some(k) = stiffness.get(stiffness.len() / 2).copied() else { return };
+    let k = stiffness.get(stiffness.len() / 2).copied()?;
     let mass = k / (TAU * LOWEST_HZ).powi(2);
     for (term, sigma) in [BESIDE * k, DAMPING_S * k, mass].into_iter().enumerate() {
         for (of, lever) in [1.0, lever_m, lever_m].into_iter().enumerate() {
             parameters.narrow(FORM + 2 + 3 * of + term, sigma * lever);
         }
     }
+    Some(k)
 }
 
 /// Whether a response point is used here.

@@ -11,10 +11,11 @@
 
 use super::block::Block;
 use super::contradictions::{self, Changes, Contradiction, Worst};
-use super::parameters::{COMPLIANCE, Cause, Parameters, RETARDATION};
+use super::parameters::{COMPLIANCE, Cause, FORM, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
 use super::{ContactError, Fit, Input};
 use crate::band::Band;
+use crate::hysteresis::contact_drift::ContactDrift;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::joint_over_bands::NORMAL_95;
@@ -65,14 +66,14 @@ pub struct Stiffness {
 /// # Errors
 /// [`ContactError::NotIdentified`] if the compliance cannot be distinguished from zero.
 pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, ContactError> {
-    let Fit { parameters, blocks, solution } = fit;
+    let Fit { parameters, blocks, solution, .. } = fit;
     let compliance = solution.p[COMPLIANCE];
     let covariance = &solution.certainty.covariance;
     let misfit = solution.chi_square.max(1.0);
     let mut row = DVector::zeros(solution.p.len());
     row[COMPLIANCE] = 1.0;
     let variances = of_sum(&row, parameters, &solution.certainty, misfit);
-    let (k_t, budget) = stiffness_of(compliance, variances, input.priors.hammer_gain)?;
+    let (mut k_t, mut budget) = stiffness_of(compliance, variances, input.priors.hammer_gain)?;
     let k = k_t.mean;
     // c = β/c₀, which the hammer's gain scales as it scales k
     let beta = solution.p[RETARDATION];
@@ -82,11 +83,22 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
         .flat_map(|i| (0..2).map(move |j| (i, j)))
         .map(|(i, j)| slopes[i] * slopes[j] * covariance[(at[i], at[j])])
         .sum();
-    let of_gain = (input.priors.hammer_gain * beta * k).powi(2);
+    let balance = force_balance(input, fit, misfit);
+    let false_scale = balance.as_ref().map(|one| one.off[0][0].abs());
+    let hammer_gain = (false_scale.unwrap_or(0.0) / NORMAL_95).hypot(input.priors.hammer_gain);
+    let of_gain = (hammer_gain * beta * k).powi(2);
     let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_gain).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
     let diagnosis = diagnose(fit);
+    let mut doubts = diagnosis.doubts(contradictions::remain(fit));
+    if let Some(off) = false_scale {
+        match offset(k_t, &mut budget, Cause::Gains, off) {
+            Some(wide) => k_t = wide,
+            None if doubts.contains(&Doubt::Force) => {}
+            None => doubts.push(Doubt::Force),
+        }
+    }
     Ok(Stiffness {
         k_t_n_per_m: k_t,
         c_t_n_s_per_m: c_t,
@@ -95,11 +107,78 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
         budget,
         includes_specimen_b: input.includes_specimen_b(),
         of_frequency: of_frequency(blocks, solution, compliance),
-        contradictions: changes.contradictions(fit),
-        doubts: diagnosis.doubts(contradictions::remain(fit)),
+        contradictions: changes.contradictions(fit).into_iter().chain(balance).collect(),
+        doubts,
         diagnosis,
         chi_square: solution.chi_square,
     })
+}
+
+/// Name of the contradiction between the hammer's force and the load cells'.
+pub const FORCE_BALANCE: &str = "the hammer's force cell";
+
+/// Standard deviations beyond which the load cells show more force than the hammer gives: this is a
+/// single test, and the sign alone is impossible.
+const IMPOSSIBLE: f64 = 3.0;
+
+/// Part of the force that passes beside the load cells in addition to the stated part, above which
+/// a statement is false: rods and cables are seldom known better.
+const MUCH_BESIDE: f64 = 0.1;
+
+/// Whether the force of the hits on B alone contradicts the load cells. In slow motion the hammer's
+/// force is the load cells' plus what passes beside them: a part that cannot be negative, and that
+/// the plan may state. The form of the force shows that part, as far as both gains are right.
+fn force_balance(input: &Input<'_>, fit: &Fit, misfit: f64) -> Option<Contradiction> {
+    let load_cells = fit.load_cells_n_per_m?;
+    let mut row = DVector::zeros(fit.solution.p.len());
+    row[FORM] = 1.0;
+    row[FORM + 2] = load_cells.recip();
+    let beside = row.iter().zip(&fit.solution.p).map(|(row, p)| row * p).sum::<f64>() - 1.0;
+    let fitted: f64 = of_sum(&row, &fit.parameters, &fit.solution.certainty, misfit).values().sum();
+    let sigma = fitted.sqrt().hypot(input.priors.gain).hypot(input.priors.hammer_gain);
+    let false_ = beside < -IMPOSSIBLE * sigma
+        || input.parallel_path.is_some_and(|stated| beside > stated + MUCH_BESIDE.max(IMPOSSIBLE * sigma));
+    let off = beside - input.parallel_path.unwrap_or(0.0);
+    false_.then(|| Contradiction::by(FORCE_BALANCE, Cause::Gains, [off, sigma]))
+}
+
+impl Stiffness {
+    /// Allows for a contact that changed during the hits on A: the interval then contains its
+    /// stiffness in the first and in the last of them. If it changed so much that no interval is
+    /// useful, this is a doubt.
+    pub fn allow_for(&mut self, drift: &ContactDrift) {
+        let own = Contradiction::by("the contact", Cause::Drift, [drift.change, drift.std]);
+        self.contradictions.push(own);
+        match over_time(self.k_t_n_per_m, &mut self.budget, drift) {
+            Some(k_t) => self.k_t_n_per_m = k_t,
+            None => self.doubts.push(Doubt::Drift),
+        }
+    }
+}
+
+/// k_T with an interval that contains the stiffness in the first and in the last hits; `None` if it
+/// changed by too much for that. The change at the spots is larger at the contact itself, because
+/// what else gives between the spots does not change.
+pub fn over_time(k_t: Interval, budget: &mut BTreeMap<Cause, f64>, drift: &ContactDrift) -> Option<Interval> {
+    let at_the_contact = (k_t.mean / drift.at_the_spots_n_per_m).max(1.0);
+    let change = 0.5 * at_the_contact * (drift.change.abs() + NORMAL_95 * drift.std);
+    offset(k_t, budget, Cause::Drift, change)
+}
+
+/// k_T with an interval that is wider by this much on both sides, relative to the value, for an
+/// error that is there for certain; `None` if no useful interval remains.
+fn offset(k_t: Interval, budget: &mut BTreeMap<Cause, f64>, cause: Cause, by: f64) -> Option<Interval> {
+    // relative to the compliance, in which the interval is symmetrical
+    let half = 0.5 * k_t.mean * (k_t.ci95[0].recip() - k_t.ci95[1].recip());
+    let whole = half + by;
+    if whole >= COMPLIANCE_HALF_WIDTH {
+        return None;
+    }
+    // the part that, added in squares as all others, gives the sum
+    let part = (whole * whole - half * half).sqrt() / NORMAL_95;
+    let share = budget.entry(cause).or_default();
+    *share = share.hypot(part);
+    Some(Interval { mean: k_t.mean, ci95: [k_t.mean / (1.0 + whole), k_t.mean / (1.0 - whole)] })
 }
 
 fn of_frequency(blocks: &[Block], solution: &Solution, compliance: f64) -> Vec<OfFrequency> {
@@ -324,6 +403,8 @@ pub enum Doubt {
     Flatness,
     /// k_T depends on where the structure is hit.
     Sides,
+    /// The contact changed while it was hit, by too much for one number.
+    Drift,
 }
 
 /// The compliance from a subset of the lines, with all other parameters from all lines: its
@@ -368,7 +449,7 @@ fn quadratic(matrix: &DMatrix<f64>, v: &DVector<f64>) -> f64 {
 /// Tests every assumption. Aims are not candidates for the largest deviation: on the moving mass
 /// they absorb the effect of shifts of the hammer. Neither are guesses.
 fn diagnose(fit: &Fit) -> Diagnosis {
-    let Fit { parameters, blocks, solution } = fit;
+    let Fit { parameters, blocks, solution, .. } = fit;
     let contradicted =
         contradictions::worst(fit).map(|Worst { what, deviations, .. }| Farthest { what, deviations });
     let stated =

@@ -295,6 +295,8 @@ pub enum Cause {
     SensorAxes,
     /// Bending and shear of the specimens between the sensors and the contact.
     Bending,
+    /// The contact changed while it was hit.
+    Drift,
     /// The model does not describe the signals down to their noise.
     Misfit,
 }
@@ -314,6 +316,7 @@ impl Cause {
             Cause::Skew => "skew",
             Cause::SensorAxes => "sensor-axes",
             Cause::Bending => "bending",
+            Cause::Drift => "drift",
             Cause::Misfit => "misfit",
         }
     }

@@ -4,6 +4,7 @@
 use super::*;
 use crate::C;
 use crate::frf::MotionQuantity;
+use crate::hysteresis::contact_drift::ContactDrift;
 use crate::spectra::cross_spectra::{CrossSpectra, OutputSums};
 use crate::structure::Structure;
 use rand::{RngExt, SeedableRng};
@@ -222,6 +223,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
         contact_m: [0.0; 3],
         spots_m: Some(SPOTS),
         specimens: [Some(Bulk::RIGID); 2],
+        parallel_path: None,
         priors,
         band_hz: BAND,
     }
@@ -308,10 +310,32 @@ fn a_stated_bulk_that_the_points_contradict_is_doubted() {
 }
 
 #[test]
+fn a_contact_that_changed_has_an_interval_from_first_to_last() {
+    let cells = measured(QUIET);
+    let found = stiffness(&input(&cells)).expect("all is there");
+    let drift =
+        |change, at_the_spots_n_per_m| ContactDrift { change, std: 2e-3, cells: 40, at_the_spots_n_per_m };
+    let allowed = |drift: ContactDrift| {
+        let mut own = found.clone();
+        own.allow_for(&drift);
+        own
+    };
+    // the displacement between the spots is twice the contact's own: the contact changed by 20 %
+    let changed = allowed(drift(0.1, 0.5 * found.k_t_n_per_m.mean));
+    let [low, high] = changed.k_t_n_per_m.ci95;
+    assert!(low < 0.91 * K && high > 1.09 * K && changed.doubts.is_empty(), "{changed:?}");
+    let budget: f64 = changed.budget.values().map(|share| share * share).sum();
+    let sigma = (low.recip() - high.recip()) / (2.0 * 1.96) * changed.k_t_n_per_m.mean;
+    assert!((sigma / budget.sqrt() - 1.0).abs() < 1e-3, "the budget adds up: {sigma} {budget}");
+    assert_eq!(changed.contradictions[0].cause, Cause::Drift);
+    assert_eq!(allowed(drift(-1.2, found.k_t_n_per_m.mean)).doubts, [Doubt::Drift]);
+}
+
+#[test]
 fn what_the_search_holds_counts_in_the_interval() {
     let cells = measured(World { noise_m_per_s: 1e-7, bulk: [2.4e-7, 0.014], ..QUIET });
     let input = Input { specimens: [None; 2], ..input(&cells) };
-    let Fit { parameters, blocks, solution } =
+    let Fit { parameters, blocks, solution, .. } =
         Prepared::new(&input).and_then(|own| own.fit(&Changes::default())).expect("all is there");
     let lateral = [parameters::LATERAL, parameters::LATERAL + 1];
     let start = parameters.start();
@@ -340,7 +364,7 @@ fn a_search_rests_when_all_parameters_do_and_not_the_compliance_alone() {
     let cells = measured(World { noise_m_per_s: 5e-7, ..QUIET });
     let mut input = input(&cells);
     input.priors = ContactPriors { skew_s: 2e-6, gain: 5e-3, ..input.priors };
-    let Fit { parameters, blocks, solution } =
+    let Fit { parameters, blocks, solution, .. } =
         Prepared::new(&input).and_then(|own| own.fit(&Changes::default())).expect("all is there");
     let sigma = |at: usize| solution.certainty.covariance[(at, at)].sqrt();
     // the load cells' gain and delay, and the spot on A

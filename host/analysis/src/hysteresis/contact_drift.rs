@@ -37,6 +37,8 @@ pub struct ContactDrift {
     pub std: f64,
     /// Cells compared.
     pub cells: usize,
+    /// T over the displacement between the spots, mean over the places of impact, N/m.
+    pub at_the_spots_n_per_m: f64,
 }
 
 impl ContactDrift {
@@ -60,11 +62,13 @@ impl ContactDrift {
             let squares = sum(|own| own.squares);
             let change = duration * sum(|own| own.squares * own.slope) / squares;
             let std = duration * sum(|own| own.squares * own.scatter).sqrt() / squares;
-            (change.is_finite() && std > 0.0).then_some([change, std])
+            let stiffness = sum(|own| own.stiffness_n_per_m) / trends.len() as f64;
+            (change.is_finite() && std > 0.0).then_some([change, std, stiffness])
         };
         let known = BANDS_HZ.into_iter().filter_map(of_band);
-        let [change, std] = known.min_by(|[_, a], [_, b]| a.total_cmp(b))?;
-        Some(Self { change, std, cells: impacts.iter().map(Vec::len).sum() })
+        let [change, std, at_the_spots_n_per_m] = known.min_by(|[_, a, _], [_, b, _]| a.total_cmp(b))?;
+        let cells = impacts.iter().map(Vec::len).sum();
+        Some(Self { change, std, cells, at_the_spots_n_per_m })
     }
 
     /// Whether it changed; `None` if that is not clear.
@@ -86,6 +90,8 @@ struct Trend {
     squares: f64,
     /// Variance of the deviations about the line.
     scatter: f64,
+    /// Magnitude of the mean, N/m.
+    stiffness_n_per_m: f64,
 }
 
 impl Trend {
@@ -100,7 +106,7 @@ impl Trend {
         let squares: f64 = points.iter().map(|[t, _]| t * t).sum();
         let slope = points.iter().map(|[t, y]| t * y).sum::<f64>() / squares;
         let rest: f64 = points.iter().map(|[t, y]| (y - slope * t).powi(2)).sum();
-        Trend { slope, squares, scatter: rest / (count - 2.0) }
+        Trend { slope, squares, scatter: rest / (count - 2.0), stiffness_n_per_m: mean.norm() }
     }
 }
 

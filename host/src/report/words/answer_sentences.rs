@@ -4,7 +4,7 @@ use super::number::{AnswerLine, BETWEEN, CLAMP, CONTACT};
 use super::number::{micro, short};
 #[cfg(feature = "sim")]
 use crate::analyse::expected::Expected;
-use crate::contact::{Cause, Contradiction, Diagnosis, Doubt, Interval, Stiffness};
+use crate::contact::{Cause, Contradiction, Diagnosis, Doubt, FORCE_BALANCE, Interval, Stiffness};
 use crate::results::{Answer, Results};
 use crate::substructuring::between_arms::Basis as Estimate;
 use std::collections::BTreeMap;
@@ -79,6 +79,7 @@ fn of_cause(cause: Cause) -> &'static str {
         Cause::Skew => "delays between channels",
         Cause::SensorAxes => "the directions of the fixed sensors' axes",
         Cause::Bending => "bending and shear of the specimens between sensors and contact",
+        Cause::Drift => "the contact's change while it was hit",
         Cause::Misfit => "signals that the model does not explain",
     }
 }
@@ -127,7 +128,12 @@ fn of_contradiction(one: &Contradiction) -> String {
             "{name} in the assembly seems off by {off}: calibrate them again. Something that touches arm B in the assembly only, for example a cable, \
              looks the same: remove it."
         ),
+        Cause::Gains if one.what == FORCE_BALANCE => force_balance(one.off[0][0], &off),
         Cause::Gains => format!("{name} seems off by {off}: calibrate it again."),
+        Cause::Drift => format!(
+            "The contact changed between the first and the last hits on A: T over the displacement between the spots changed by {off}. Look for wear, for a \
+             normal load that relaxes, and for temperature."
+        ),
         Cause::Skew => {
             format!("{name} seems off by {off}: check the filters and the clock of its channel.")
         }
@@ -137,6 +143,19 @@ fn of_contradiction(one: &Contradiction) -> String {
     }
 }
 
+/// The hammer's force against the load cells' in the hits on B alone.
+fn force_balance(off: f64, told: &str) -> String {
+    let how = if off < 0.0 {
+        "in the hits on B alone the load cells show more force than the hammer gives"
+    } else {
+        "in the hits on B alone much more force passes beside the load cells than `parallel_path` states, or so it seems"
+    };
+    format!(
+        "The hammer's force cell or the load cells seem off by {told}: {how}. k_T is in proportion to the hammer's force: calibrate both, and strike a body of known mass \
+         (`campaign check --mass`)."
+    )
+}
+
 /// Deviations that are significant against their own uncertainty, or the largest.
 fn how_far(one: &Contradiction) -> String {
     let significance = |[off, sigma]: &[f64; 2]| (off / sigma).abs();
@@ -144,7 +163,7 @@ fn how_far(one: &Contradiction) -> String {
     let of = |(axis, own): (usize, &[f64; 2])| {
         let [off, _] = *own;
         (significance(own) >= most.min(3.0)).then(|| match one.cause {
-            Cause::Gains | Cause::SensorAxes => format!("{:.1} %", 100.0 * off.abs()),
+            Cause::Gains | Cause::SensorAxes | Cause::Drift => format!("{:.1} %", 100.0 * off.abs()),
             Cause::Skew => format!("{:.0} µs", 1e6 * off.abs()),
             Cause::HammerTilt => format!("{:.1}°", off.abs().asin().to_degrees()),
             _ => format!("{:.2} mm along {}", 1e3 * off.abs(), ["x", "y", "z"][axis % 3]),
@@ -179,6 +198,7 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
                 )
             });
         }
+        Doubt::Drift => "the contact changed too much while it was hit for one stiffness to describe it",
         Doubt::Flatness => "the stiffness changes with frequency, which a contact's stiffness does not",
         Doubt::Sides => {
             "hits on A and on the moving mass give different values (has the contact changed between them? compare the first hits with later ones)"

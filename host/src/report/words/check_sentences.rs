@@ -359,12 +359,12 @@ fn phases(split: &PhaseSplit) -> String {
 
 /// Whether the contact's stiffness changed from the first hits on A to the last.
 fn contact_drift(found: &ContactDrift) -> Check {
-    let ContactDrift { change, std, cells } = *found;
+    let ContactDrift { change, std, cells, .. } = *found;
     let [percent, half] = [100.0 * change, 100.0 * NORMAL_95 * std].map(|value| decimals(value, 1));
     let meaning = match found.found() {
         Some(true) => format!(
             "The contact changed between the first and the last hits on A: T over the displacement between the spots changed by {percent} ± {half} %. k_T is a \
-             mean over that time, and its interval does not contain the change. Look for wear, for a normal load that relaxes, and for temperature."
+             mean over that time, and its interval contains the change. Look for wear, for a normal load that relaxes, and for temperature."
         ),
         Some(false) => format!(
             "The contact is the same in the first and the last hits on A: T over the displacement between the spots changed by {percent} ± {half} % over {cells} cells."
