@@ -43,6 +43,7 @@ pub mod frf;
 pub mod hysteresis;
 pub mod identified;
 pub mod median;
+pub mod modes;
 mod parallel;
 pub mod spectra;
 pub mod structure;
