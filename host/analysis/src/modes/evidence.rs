@@ -8,7 +8,9 @@
 
 use super::Settings;
 use super::data::Data;
-use super::likelihood::{Beyond, Evaluation, Model, Normal, fit, fit_roughly, gains, rank_one, with_shapes};
+use super::likelihood::{
+    Beyond, Evaluation, Model, NARROWEST, Normal, fit, fit_roughly, gains, rank_one, with_shapes,
+};
 use crate::C;
 use crate::parallel::{join, prelude::*};
 use nalgebra::{DMatrix, DVector};
@@ -72,7 +74,7 @@ pub(super) fn scale(data: &Data, at: &Evaluation) -> f64 {
 }
 
 /// Relative variance of values that are exact but for rounding; below it nothing is evidence.
-const ROUNDING: f64 = 1e-24;
+const ROUNDING: f64 = 1e-20;
 
 /// The model with all poles and residual terms that the data give evidence for.
 pub(super) fn select(data: &Data, starts: &[C], settings: &Settings) -> Evaluation {
@@ -115,6 +117,10 @@ const CONTAINED: f64 = 1.5;
 pub(super) fn is_mode(data: &Data, pole: C, settings: &Settings) -> bool {
     let width = CONTAINED * data.half_width(pole);
     let (low, high) = (data.s[0].im, data.s[data.lines() - 1].im);
+    // at the limit of the fit a pole describes a single line
+    if data.half_width(pole) < 1.5 * NARROWEST * data.step {
+        return false;
+    }
     -pole.re / pole.norm() < settings.damping_limit && pole.im - width >= low && pole.im + width <= high
 }
 

@@ -589,7 +589,7 @@ fn of_output(
 
 /// Poles closer to the line of measurement than this many steps of it would describe a single line,
 /// not a peak.
-const NARROWEST: f64 = 0.05;
+pub(super) const NARROWEST: f64 = 0.05;
 
 /// Poles this many times below or above the band cannot be told from a residual term.
 const FARTHEST: f64 = 8.0;

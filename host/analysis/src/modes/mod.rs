@@ -102,7 +102,7 @@ pub struct DrivingPoint {
 #[non_exhaustive]
 pub enum Scaling {
     /// Modal A is one: at driving points shape and participation are equal (up to the sign), so
-    /// that X(s) = Σ_r [φ_r φ_rᵀ/(s − λ_r) + conjugate], φ in √(m/(N s)). Divided by √(2 i ω_d), with
+    /// that X(s) = Σ_r [φ_r φ_rᵀ/(s − λ_r) + conjugate], φ in √(m/(N s)). Multiplied by √(2 i ω_d), with
     /// ω_d = Im λ, φ of a mode in phase is scaled to unit modal mass (1/√kg, up to a sign): the
     /// residue of such a mode is φφᵀ/(2 i ω_d m).
     UnitModalA,
