@@ -227,18 +227,22 @@ fn peaks(data: &Data, at: &Evaluation, residual: &DMatrix<f64>, settings: &Setti
     }
     let limit = threshold(data);
     let noise = scale(data, at);
-    let of_pole = |&pole: &C| {
-        let filtered = filtered(data, residual, pole);
-        let needed = limit * correlated(data, pole);
-        // cheap test first
-        if 2.0 * filtered.norm_squared() < needed * noise {
-            return None;
-        }
-        let gain = rank_one(&filtered).0.norm_squared();
-        (2.0 * gain > needed * noise).then_some((gain, needed, pole))
+    let weighted = weighted(data, residual);
+    let of_group = |poles: &[C]| -> Vec<(f64, f64, C)> {
+        let found =
+            filtered(data, &weighted, poles).into_iter().zip(poles).filter_map(|(filtered, &pole)| {
+                let needed = limit * correlated(data, pole);
+                // cheap test first
+                if 2.0 * filtered.norm_squared() < needed * noise {
+                    return None;
+                }
+                let gain = rank_one(&filtered).0.norm_squared();
+                (2.0 * gain > needed * noise).then_some((gain, needed, pole))
+            });
+        found.collect()
     };
-    let found: Vec<Option<(f64, f64, C)>> = grid.par_iter().with_min_len(16).map(of_pole).collect();
-    let mut found: Vec<(f64, f64, C)> = found.into_iter().flatten().collect();
+    let found: Vec<Vec<(f64, f64, C)>> = grid.par_chunks(GROUP).map(of_group).collect();
+    let mut found = found.concat();
     found.sort_by(|a, b| (b.0 / b.1).total_cmp(&(a.0 / a.1)));
     let mut taken: Vec<C> = Vec::new();
     let mut peaks = Vec::new();
@@ -271,41 +275,62 @@ fn reach(data: &Data, pole: C) -> std::ops::Range<usize> {
     from..data.s.partition_point(|s| s.im <= pole.im + width)
 }
 
-/// Output × input: the residual's correlation with a peak at this pole, in units of its noise.
-fn filtered(data: &Data, residual: &DMatrix<f64>, pole: C) -> DMatrix<C> {
-    let sums = correlations(data, residual, pole);
-    DMatrix::from_fn(data.outputs, data.inputs, |o, i| {
-        let (sum, power) = sums[o * data.inputs + i];
-        if power > 0.0 { sum / power.sqrt() } else { C::from(0.0) }
-    })
+/// Poles that are filtered at a time: neighbours of one width share most of their lines, and a
+/// product of matrices is several times faster than as many sums.
+const GROUP: usize = 16;
+
+/// The residual times its weight.
+fn weighted(data: &Data, residual: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut weighted = residual.clone();
+    let mut halves = weighted.rows_range_pair_mut(..data.lines(), data.lines()..);
+    halves.0.component_mul_assign(&data.weight);
+    halves.1.component_mul_assign(&data.weight);
+    weighted
+}
+
+/// By pole, output × input: the residual's correlation with a peak there, in units of its noise.
+fn filtered(data: &Data, weighted: &DMatrix<f64>, poles: &[C]) -> Vec<DMatrix<C>> {
+    let sums = correlations(data, weighted, poles);
+    (sums.into_iter())
+        .map(|(sum, power)| {
+            sum.zip_map(&power, |sum, power| if power > 0.0 { sum / power.sqrt() } else { C::from(0.0) })
+        })
+        .collect()
 }
 
 /// Output × input: the residue of a peak at this pole.
 fn residues(data: &Data, residual: &DMatrix<f64>, pole: C) -> DMatrix<C> {
-    let sums = correlations(data, residual, pole);
-    DMatrix::from_fn(data.outputs, data.inputs, |o, i| {
-        let (sum, power) = sums[o * data.inputs + i];
-        if power > 0.0 { sum / power } else { C::from(0.0) }
-    })
+    let (sum, power) = correlations(data, &weighted(data, residual), &[pole]).swap_remove(0);
+    sum.zip_map(&power, |sum, power| if power > 0.0 { sum / power } else { C::from(0.0) })
 }
 
-/// By cell: the weighted sums of peak × residual and of |peak|².
-fn correlations(data: &Data, residual: &DMatrix<f64>, pole: C) -> Vec<(C, f64)> {
-    let range = reach(data, pole);
-    let lines = data.lines();
-    let peak: Vec<C> = range.clone().map(|l| (data.s[l] - pole).inv() * data.to_quantity[l]).collect();
-    let of_cell = |cell: usize| {
-        let column = residual.column(cell);
-        let column = column.as_slice();
-        let weight = &data.weight.as_slice()[cell * lines..][range.clone()];
-        let (re, im) = (&column[..lines][range.clone()], &column[lines..][range.clone()]);
-        let (mut sum, mut power) = (C::from(0.0), 0.0);
-        for ((peak, weight), (re, im)) in peak.iter().zip(weight).zip(re.iter().zip(im)) {
-            sum.re += weight * (peak.re * re + peak.im * im);
-            sum.im += weight * (peak.re * im - peak.im * re);
-            power += weight * peak.norm_sqr();
+/// By pole, output × input: the weighted sums of conj(peak) × residual and of |peak|².
+fn correlations(data: &Data, weighted: &DMatrix<f64>, poles: &[C]) -> Vec<(DMatrix<C>, DMatrix<f64>)> {
+    let ranges: Vec<std::ops::Range<usize>> = poles.iter().map(|pole| reach(data, *pole)).collect();
+    let from = ranges.iter().map(|range| range.start).min().unwrap_or(0);
+    let to = ranges.iter().map(|range| range.end).max().unwrap_or(0).max(from);
+    let (count, lines) = (to - from, data.lines());
+    let mut re = DMatrix::zeros(poles.len(), count);
+    let mut im = DMatrix::zeros(poles.len(), count);
+    for (k, (pole, range)) in poles.iter().zip(&ranges).enumerate() {
+        for l in range.clone() {
+            let peak = (data.s[l] - pole).inv() * data.to_quantity[l];
+            (re[(k, l - from)], im[(k, l - from)]) = (peak.re, peak.im);
         }
-        (sum, power)
+    }
+    let square = re.map(|v| v * v) + im.map(|v| v * v);
+    let (r_re, r_im) = (weighted.rows(from, count), weighted.rows(lines + from, count));
+    let sum_re = &re * r_re + &im * r_im;
+    let sum_im = &re * r_im - &im * r_re;
+    let power = square * data.weight.rows(from, count);
+    let of_pole = |k: usize| {
+        let cell = |o: usize, i: usize| (k, o * data.inputs + i);
+        (
+            DMatrix::from_fn(data.outputs, data.inputs, |o, i| {
+                C::new(sum_re[cell(o, i)], sum_im[cell(o, i)])
+            }),
+            DMatrix::from_fn(data.outputs, data.inputs, |o, i| power[cell(o, i)]),
+        )
     };
-    (0..data.cells()).map(of_cell).collect()
+    (0..poles.len()).map(of_pole).collect()
 }

@@ -9,7 +9,7 @@
 
 use super::data::Data;
 use super::evidence::scale;
-use super::likelihood::{Evaluation, Factors, Model, Normal};
+use super::likelihood::{Evaluation, Factors, Model, Normal, transposed_times};
 use super::{DrivingPoint, Mode, ResidualTerm, Scaling};
 use crate::C;
 use crate::parallel::prelude::*;
@@ -90,7 +90,7 @@ fn covariance_of_mode(
         }
     }
     factors.shared.l_dirty().solve_lower_triangular_mut(&mut half);
-    let mut covariance = half.tr_mul(&half);
+    let mut covariance = transposed_times(&half, &half);
     for (o, (chol, _)) in factors.outputs.iter().enumerate() {
         let mut own = DMatrix::zeros(2 * n, 2);
         own[(2 * r, 0)] = 1.0;
@@ -252,7 +252,7 @@ fn terms(
         let by_shape = multiplied(0, &|r| model.participation[(i, r)]);
         let by_participation = multiplied(0, &|r| model.shape[(o, r)]);
         let by_pole = multiplied(2 * n, &|r| model.residue(cell, r));
-        let mut shared = -eliminated[o].tr_mul(&by_shape);
+        let mut shared = -transposed_times(&eliminated[o], &by_shape);
         let mut to = shared.rows_mut(0, 2 * n);
         to += by_pole;
         let mut to = shared.rows_mut(2 * n * (i + 1), 2 * n);
