@@ -168,8 +168,6 @@ fn with_one_more(data: &Data, at: &Evaluation, settings: &Settings) -> Option<Ev
     let residual = at.residuals(data);
     let (mut all, beyond) = join(|| peaks(data, at, &residual, settings), || beyond(data, at, &residual));
     all.extend(beyond);
-    // adapting the other modes can double the decrease
-    all.retain(|candidate| 2.0 * candidate.gain > candidate.needed * noise);
     all.sort_by(|a, b| (b.gain - b.needed * noise).total_cmp(&(a.gain - a.needed * noise)));
     for candidate in all.into_iter().take(TRIES) {
         let with = fit_roughly(data, candidate.model);
@@ -189,25 +187,26 @@ fn beyond(data: &Data, at: &Evaluation, residual: &DMatrix<f64>) -> Vec<Candidat
     let more: Vec<Beyond> = (powers.map(|power| Beyond::Power(*power)))
         .chain(places.map(|omega| Beyond::Pole(C::new(-0.01 * omega, omega))))
         .collect();
-    let cells = data.cells() as f64;
+    let noise = scale(data, at);
+    // what noise gains in all cells, each with so many real values: the mean of its χ² and five
+    // standard deviations of it
+    let by_noise = |values: f64| {
+        let all = values * data.cells() as f64;
+        (all + 5.0 * (2.0 * all).sqrt()) * data.noise_at_start()
+    };
     let gains = gains(data, at, &more);
     let candidate = |(gain, one): (f64, Beyond)| match one {
-        Beyond::Power(power) => Candidate {
-            gain,
-            // one term per cell: the mean of its χ² and five standard deviations of it
-            needed: (cells + 5.0 * (2.0 * cells).sqrt()) * data.noise_at_start(),
-            model: at.model.with_power(power),
-        },
-        Beyond::Pole(pole) => {
-            let (shape, participation) = rank_one(&residues(data, residual, pole));
-            Candidate {
-                gain,
-                needed: threshold(data) * data.noise_at_start(),
-                model: at.model.with(pole, &shape, &participation),
-            }
+        Beyond::Power(power) => {
+            let needed = by_noise(1.0);
+            (gain > needed * noise).then(|| Candidate { gain, needed, model: at.model.with_power(power) })
         }
+        Beyond::Pole(pole) => (gain > by_noise(2.0) * noise).then(|| {
+            let (shape, participation) = rank_one(&residues(data, residual, pole));
+            let needed = threshold(data) * data.noise_at_start();
+            Candidate { gain, needed, model: at.model.with(pole, &shape, &participation) }
+        }),
     };
-    gains.into_iter().zip(more).map(candidate).collect()
+    gains.into_iter().zip(more).filter_map(candidate).collect()
 }
 
 /// The peaks of the residual, strongest first: a matched filter for one mode on a grid of
