@@ -61,7 +61,7 @@ impl Data {
         let omega_ref = TAU * frf.frequency_hz()[lines - 1];
         let s: Vec<C> = (0..lines).map(|l| frf.s(l) / omega_ref).collect();
         let to_quantity = s.iter().map(|s| s.powi(order)).collect();
-        let sum: f64 = frf.lines().iter().flat_map(DMatrix::iter).map(|v| v.norm_sqr()).sum();
+        let sum: f64 = frf.lines().iter().flat_map(DMatrix::iter).map(C::norm_sqr).sum();
         let value_ref = (sum / (lines * cells) as f64).sqrt();
         if value_ref == 0.0 {
             return Err(ModesError::AllZero);

@@ -9,11 +9,12 @@
 use super::Settings;
 use super::data::Data;
 use super::likelihood::{
-    Beyond, Evaluation, Model, NARROWEST, Normal, fit, fit_roughly, gains, rank_one, with_shapes,
+    Beyond, Evaluation, Model, NARROWEST, Normal, fit, fit_roughly, fit_without_creeping, gains, rank_one,
+    with_shapes,
 };
 use crate::C;
 use crate::parallel::{join, prelude::*};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Probability that noise alone yields a mode in one identification.
 const FALSE_ALARMS: f64 = 1e-3;
@@ -124,23 +125,31 @@ pub(super) fn is_mode(data: &Data, pole: C, settings: &Settings) -> bool {
     -pole.re / pole.norm() < settings.damping_limit && pole.im - width >= low && pole.im + width <= high
 }
 
+/// Distance of two poles, in half widths, below which each is removed on trial.
+const CLOSE: f64 = 0.5;
+
 /// Removes the poles without evidence, the weakest first.
 fn without_insignificant(data: &Data, mut at: Evaluation) -> Evaluation {
     loop {
         let poles = &at.model.poles;
         let Some(normal) = Normal::new(data, &at) else { return at };
         let noise = scale(data, &at);
+        // the loss does not let the other poles move, which matters next to another one
+        let is_close = |r: usize| {
+            let near = |k: usize| (poles[k] - poles[r]).norm() < CLOSE * data.half_width(poles[r]);
+            (0..poles.len()).any(|k| k != r && near(k))
+        };
         let mut doubtful: Vec<(usize, [f64; 2], f64)> = normal
             .loss_without(&at.model)
             .into_iter()
             .enumerate()
             .map(|(r, loss)| (r, loss, threshold(data) * noise * correlated(data, poles[r])))
-            .filter(|(_, [adapted, _], needed)| *adapted < 2.0 * needed)
+            .filter(|(r, [adapted, _], needed)| *adapted < 2.0 * needed || is_close(*r))
             .collect();
         doubtful.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
         let mut next = None;
         for (mode, [_, at_most], needed) in doubtful {
-            let without = fit_roughly(data, at.model.without(mode));
+            let without = fit_without_creeping(data, at.model.without(mode));
             if at_most < needed || without.chi2 - at.chi2 < needed {
                 next = Some(without);
                 break;

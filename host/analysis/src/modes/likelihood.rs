@@ -239,13 +239,16 @@ fn inner_products(basis: &DMatrix<f64>, lines: usize) -> (DMatrix<f64>, Vec<(usi
     (DMatrix::from_vec(columns * (columns + 1) / 2, segments, packed.concat()), bounds)
 }
 
+/// The residual terms of one cell: factors of their own block, their coupling to the other columns,
+/// and their gradient.
+type TermsNormal = (Cholesky<f64, Dyn>, DMatrix<f64>, DVector<f64>);
+
 /// The normal equations of one cell after its residual terms were eliminated.
 struct CellNormal {
     /// 4 × modes: residues and derivatives by the poles.
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// Inverse of the terms' own block, and the terms' coupling to the other columns.
-    terms: Option<(Cholesky<f64, Dyn>, DMatrix<f64>, DVector<f64>)>,
+    terms: Option<TermsNormal>,
 }
 
 impl CellNormal {
@@ -637,6 +640,12 @@ pub(super) fn fit(data: &Data, start: Model) -> Evaluation {
 /// As [`fit`], but only as accurately as decisions about modes need.
 pub(super) fn fit_roughly(data: &Data, start: Model) -> Evaluation {
     minimise(data, start, ROUGH_STEPS, ROUGH, CREEPING)
+}
+
+/// As [`fit_roughly`], but to the end: what is left must not count as evidence for a pole that was
+/// removed.
+pub(super) fn fit_without_creeping(data: &Data, start: Model) -> Evaluation {
+    minimise(data, start, STEPS, ROUGH, 0.0)
 }
 
 fn minimise(data: &Data, mut start: Model, steps: usize, accuracy: f64, creeping: f64) -> Evaluation {

@@ -67,7 +67,13 @@ fn one_mass_is_exact_in_every_quantity_with_and_without_a_window() {
         for sigma in [0.0, 2.3, 50.0] {
             let rig = Masses::one(mass, omega, damping_ratio);
             let found = found(&rig.frf(axis(50.0, 0.25, 500), sigma, quantity));
-            let [mode] = &found.modes[..] else { panic!("{} modes", found.modes.len()) };
+            let [mode] = &found.modes[..] else {
+                panic!(
+                    "{quantity:?} {sigma}: {:?}, χ² {:e}",
+                    found.modes.iter().map(|m| (m.pole_per_s, m.evidence)).collect::<Vec<_>>(),
+                    found.chi2_per_dof
+                )
+            };
             assert!((mode.frequency_hz / 100.0 - 1.0).abs() < EXACT, "{}", mode.frequency_hz);
             assert!((mode.damping_ratio - damping_ratio).abs() < EXACT, "{}", mode.damping_ratio);
             // residue of the receptance: 1/(2 i ω_d m)
@@ -99,6 +105,45 @@ fn two_masses_are_exact() {
     let shape = &found.modes[1].shape;
     assert!((shape[1] / shape[0] + 1.0).norm() < 1e-7);
     assert!(mac(&found.modes[0].shape, &found.modes[1].shape) < EXACT);
+}
+
+/// Poles of three masses of 2, 1.2 and 0.8 kg on springs of 2.2, 1.5 and 1.1 N/µm with dampers of 18,
+/// 4 and 1 N s/m, by numpy's eigenvalues of the state matrix.
+const REFERENCE: [C; 3] = [
+    C::new(-0.896_015_795_693_312_4, 579.099_442_215_002),
+    C::new(-3.421_855_655_879_170_4, 1_288.363_407_422_295),
+    C::new(-3.890_461_881_760_743, 1_842.927_076_854_469_3),
+];
+
+/// Mobilities of that structure on the line of a window of 2.3 1/s, by numpy's inverse of its
+/// dynamic stiffness at each line; ten digits.
+#[test]
+fn the_reference_case_has_its_poles() {
+    let rows: Vec<Vec<&str>> = include_str!("../../examples/data/modes.csv")
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').collect())
+        .collect();
+    let number = |text: &str| text.parse::<f64>().expect("a number");
+    let (outputs, inputs) = (["m1", "m2", "m3"], ["f1", "f3"]);
+    let lines = rows.chunks(6).map(|line| {
+        let values = line.iter().map(|row| C::new(number(row[3]), number(row[4])));
+        DMatrix::from_row_iterator(3, 2, values)
+    });
+    let frf = Frf::new(
+        rows.chunks(6).map(|line| number(line[0][0])).collect(),
+        2.3,
+        MotionQuantity::Velocity,
+        outputs.map(String::from).to_vec(),
+        inputs.map(String::from).to_vec(),
+        lines.collect(),
+    );
+    let found = found(&frf.expect("all agree"));
+    assert_eq!(found.modes.len(), 3);
+    for (mode, pole) in found.modes.iter().zip(REFERENCE) {
+        assert!((mode.pole_per_s - pole).norm() < 1e-8 * pole.norm(), "{}", mode.pole_per_s);
+    }
+    assert_eq!(found.background, []);
 }
 
 #[test]

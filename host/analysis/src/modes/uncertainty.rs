@@ -139,7 +139,7 @@ fn mode(
         amplitudes.row_mut(at).scale_mut(residue_unit);
         amplitudes.column_mut(at).scale_mut(residue_unit);
     }
-    let scaled = Scaled::new(shape, participation, &amplitudes, driving);
+    let scaled = Scaled::new(&shape, &participation, &amplitudes, driving);
     Mode {
         pole_per_s: pole,
         pole_covariance: pole_covariance.into(),
@@ -169,8 +169,8 @@ impl Scaled {
     /// Multiplies the shape by a factor c and divides the participation by it. `amplitudes` is the
     /// covariance of both.
     fn new(
-        shape: DVector<C>,
-        participation: DVector<C>,
+        shape: &DVector<C>,
+        participation: &DVector<C>,
         amplitudes: &DMatrix<f64>,
         driving: &[DrivingPoint],
     ) -> Scaled {
