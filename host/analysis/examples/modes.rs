@@ -31,12 +31,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let found = identify(&frf, &settings)?;
     println!("{} of {} modes, noise {:?}", found.modes.len(), TRUE.len(), found.noise);
     for (mode, [frequency_hz, damping_ratio]) in found.modes.iter().zip(TRUE) {
+        let shape: Vec<String> =
+            mode.shape.iter().map(|v| format!("{:+.3}", v.norm() * v.re.signum())).collect();
         println!(
             "{:9.4} Hz (true {frequency_hz:9.4}), damping {:.4} % (true {:.4} %), shape {}",
             mode.frequency_hz,
             100.0 * mode.damping_ratio,
             100.0 * damping_ratio,
-            mode.shape.iter().map(|v| format!("{:+.3} ", v.norm() * v.re.signum())).collect::<String>(),
+            shape.join(" "),
         );
     }
     for (k, mode) in found.modes.iter().enumerate() {
