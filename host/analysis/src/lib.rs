@@ -31,6 +31,7 @@
 //!   [`substructuring::identify`](fn@substructuring::identify) performs the whole identification;
 //!   [`substructuring::averaged`] gives the value to quote, with its interval.
 //! - FRFs from the records of a hammer: [`spectra::estimate`](fn@spectra::estimate).
+//! - Modes of a structure from FRFs: [`modes::identify`](fn@modes::identify).
 //! - k_T from a record of a sliding contact: [`hysteresis::analyse`](fn@hysteresis::analyse).
 //!
 //! The feature `rayon` uses all cores; results are bit-identical with and without it.
@@ -43,6 +44,7 @@ pub mod frf;
 pub mod hysteresis;
 pub mod identified;
 pub mod median;
+pub mod modes;
 mod parallel;
 pub mod spectra;
 pub mod structure;
