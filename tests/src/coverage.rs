@@ -61,7 +61,10 @@ impl Coverage {
     /// As cells of a table: number of intervals that cover, rms error, median half width.
     pub fn cells(&self) -> String {
         let Coverage { answers, covered, .. } = self;
-        let share = 100.0 * *covered as f64 / (*answers).max(1) as f64;
+        if *answers == 0 {
+            return "0 of 0 | – | –".into();
+        }
+        let share = 100.0 * *covered as f64 / *answers as f64;
         let [rms, half] = [self.rms, self.half].map(|part| 100.0 * part);
         format!("{covered} of {answers} ({share:.1} %) | {rms:.2} % | {half:.2} %")
     }

@@ -14,7 +14,8 @@ use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Averaged, Priors};
-use crate::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
+use crate::substructuring::between_arms::{BELOW, BetweenArms, NoStiffness, between_arms};
+use crate::substructuring::fit::{FitError, Fitted};
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify, keep_common_lines};
 use std::collections::HashSet;
@@ -79,12 +80,18 @@ pub fn analyse_measurements<M: Measurements>(
 
     // the fit between the arms, and beside it the contact's own stiffness from the hits: each uses
     // cores that the other leaves idle
-    let fit = || {
-        let Ok(frfs) = all_three(alike) else { return Vec::new() };
-        fit_of_the_main_band(frfs, geometry, &fit::Options { priors, ..fit::Options::default() })
+    let between_the_arms_by_fit = || {
+        let Ok([a, b, ajb]) = all_three(alike) else {
+            return (Vec::new(), decided(&[], &recommended.estimates, || Err(FitError::NoMinimum)));
+        };
+        let options = fit::Options { priors, ..fit::Options::default() };
+        let fits = fit_of_the_main_band([a, b, ajb], geometry, &options);
+        let below = || fit::fit(a, b, ajb, geometry, IdmSet::Six, BELOW, &options);
+        let decided = decided(&fits, &recommended.estimates, below);
+        (fits, decided)
     };
-    let (fits, own) = rayon::join(fit, || contact_answer::answer(measurements, &cells.averages));
-    let between_arms = decided(&fits, &recommended.estimates);
+    let ((fits, between_arms), own) =
+        rayon::join(between_the_arms_by_fit, || contact_answer::answer(measurements, &cells.averages));
 
     // the specimens: loops, levels, and their stiffness compared with that between the arms
     let fitted: Vec<_> = fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
@@ -186,12 +193,17 @@ fn fit_of_the_main_band(frfs: [&Frf; 3], geometry: &Geometry, options: &fit::Opt
     fits(frfs, geometry, &[idms], &[MAIN_BAND], options)
 }
 
-/// Decides which estimate of the main band is the stiffness between the arms.
-fn decided(fits: &[Fit], recommended: &[Averaged]) -> Result<BetweenArms, NoStiffness> {
+/// Decides which estimate of the main band is the stiffness between the arms; `below` is the fit to
+/// the lines below it.
+fn decided(
+    fits: &[Fit],
+    recommended: &[Averaged],
+    below: impl FnOnce() -> Result<Fitted, FitError>,
+) -> Result<BetweenArms, NoStiffness> {
     let fitted = fits.first().and_then(|fit| match &fit.outcome {
         Ok(fitted) => Some(Ok(fitted)),
         Err(NoFit::Failed(error)) => Some(Err(error)),
         Err(_) => None,
     });
-    between_arms(fitted, recommended.iter().find(|r| r.band_hz == MAIN_BAND))
+    between_arms(fitted, recommended.iter().find(|r| r.band_hz == MAIN_BAND), below)
 }

@@ -12,7 +12,7 @@
 use crate::simulated;
 
 use jointrig::substructuring::averaged::{Priors, averaged};
-use jointrig::substructuring::between_arms::{BetweenArms, NoStiffness, between_arms};
+use jointrig::substructuring::between_arms::{BELOW, BetweenArms, NoStiffness, between_arms};
 use jointrig::substructuring::fit::{Options, fit};
 use jointrig::substructuring::{Band, IdmSet};
 use jointrig_hil_sim::rig::RigConfig;
@@ -84,12 +84,12 @@ impl Case {
     }
 
     fn answer(&self, band: Band) -> Result<BetweenArms, NoStiffness> {
-        let c = campaign(&self.config, self.floor, self.seed, [band.low_hz, band.high_hz]);
+        let c = campaign(&self.config, self.floor, self.seed, [BELOW.low_hz, band.high_hz]);
         let [a, b, ajb] = [&c.a, &c.b, &c.ajb].map(|m| &m.frf);
         let geometry = geometry();
         let recommended = averaged(ajb, &geometry, IdmSet::Six, band, &Priors::default()).expect("data");
-        let fitted = fit(a, b, ajb, &geometry, IdmSet::Six, band, &Options::default());
-        between_arms(Some(fitted.as_ref()), Some(&recommended))
+        let fitted = |band| fit(a, b, ajb, &geometry, IdmSet::Six, band, &Options::default());
+        between_arms(Some(fitted(band).as_ref()), Some(&recommended), || fitted(BELOW))
     }
 
     fn covered_by(&self, found: &BetweenArms) -> bool {
