@@ -102,8 +102,12 @@ pub fn analyse_measurements<M: Measurements>(
     missing.extend(absent);
     let mut own_stiffness = own.map(|(stiffness, _)| stiffness);
     if let Some(drift) = contact.drift.filter(|drift| drift.found() == Some(true)) {
-        own_stiffness.iter_mut().for_each(|own| own.allow_for(&drift));
-        contact.joint.iter_mut().for_each(|joint| joint.allow_for(&drift));
+        if let Ok(own) = &mut own_stiffness {
+            own.allow_for(&drift);
+        }
+        if let Some(joint) = &mut contact.joint {
+            joint.allow_for(&drift);
+        }
     }
 
     let windowing = Windowing { sigma_per_s: measurements.sigma_per_s(), ..Windowing::default() };
