@@ -4,10 +4,10 @@
 //! cargo run -p jointrig-analysis --example modes
 //! ```
 //!
-//! Three masses in a row on springs were hit at the first and at the last one (modes.csv: mobilities
-//! of three outputs and two inputs, measured with an exponential window of 2.3 1/s). The file was
-//! computed from the masses, springs and dampers by inverting the dynamic stiffness line by line; the
-//! poles of that structure are printed beside those found.
+//! Three masses in a row on springs were hit at the first and at the last one (modes.csv:
+//! mobilities of three outputs and two inputs, measured with an exponential window of 2.3 1/s). The
+//! file was computed from the masses, springs and dampers by inverting the dynamic stiffness line
+//! by line; the poles of that structure are printed beside those found.
 
 mod csv;
 

@@ -14,7 +14,7 @@ use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
 use crate::substructuring::averaged::{Averaged, Priors};
-use crate::substructuring::between_arms::{BELOW, BetweenArms, NoStiffness, between_arms};
+use crate::substructuring::between_arms::{BELOW, BetweenArms, NoStiffness, Unfit, between_arms};
 use crate::substructuring::fit::{FitError, Fitted};
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify, keep_common_lines};
@@ -82,7 +82,8 @@ pub fn analyse_measurements<M: Measurements>(
     // cores that the other leaves idle
     let between_the_arms_by_fit = || {
         let Ok([a, b, ajb]) = all_three(alike) else {
-            return (Vec::new(), decided(&[], &recommended.estimates, || Err(FitError::NoMinimum)));
+            let without = NoStiffness::Neither { fit: Unfit::NotMade, recommended: Unfit::Unchecked };
+            return (Vec::new(), Err(without));
         };
         let options = fit::Options { priors, ..fit::Options::default() };
         let fits = fit_of_the_main_band([a, b, ajb], geometry, &options);

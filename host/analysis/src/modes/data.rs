@@ -1,5 +1,5 @@
-//! The measured values in the form that the fit needs: those of one band with their weights, free of
-//! units.
+//! The measured values in the form that the fit needs: those of one band with their weights, free
+//! of units.
 
 use super::{ModesError, NoiseKnown, Settings};
 use crate::C;
@@ -11,8 +11,9 @@ use std::f64::consts::TAU;
 ///
 /// They stay in their quantity, in which noise varies little from line to line; the model's
 /// receptance is multiplied by `to_quantity`. The Laplace variable is divided by `omega_ref`, the
-/// values by their root mean square, so that poles and residues are of order one. A cell is one output and one input; its index is
-/// output × inputs + input, so that the cells of one output are neighbours.
+/// values by their root mean square, so that poles and residues are of order one. A cell is one
+/// output and one input; its index is output × inputs + input, so that the cells of one output are
+/// neighbours.
 pub(super) struct Data {
     /// s of each line over `omega_ref`, on the line σ + iω of the exponential window.
     pub(super) s: Vec<C>,
@@ -114,6 +115,13 @@ impl Data {
     /// Distance of a pole from the line of measurement: the half width of its peak.
     pub(super) fn half_width(&self, pole: C) -> f64 {
         self.sigma - pole.re
+    }
+
+    /// d/(d + σ), d the [half width](Self::half_width): 1 without a window, near one half if the
+    /// window's damping exceeds the pole's.
+    pub(super) fn share_of_noise(&self, pole: C) -> f64 {
+        let d = self.half_width(pole);
+        d / (d + self.sigma)
     }
 
     /// The factor by which a line's variance is exceeded by that of the noise at the start of a

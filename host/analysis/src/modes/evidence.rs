@@ -9,7 +9,7 @@
 use super::Settings;
 use super::data::Data;
 use super::likelihood::{
-    Beyond, Evaluation, Model, NARROWEST, Normal, fit, fit_roughly, fit_without_creeping, gains, rank_one,
+    Beyond, Evaluation, Model, NARROWEST, Normal, fit, fit_roughly, fit_to_the_end, gains, rank_one,
     with_shapes,
 };
 use crate::C;
@@ -61,8 +61,7 @@ pub(super) fn threshold(data: &Data) -> f64 {
 
 /// Factor by which the window's correlation between lines enlarges the noise of a mode's residue.
 pub(super) fn correlated(data: &Data, pole: C) -> f64 {
-    let width = data.half_width(pole);
-    data.noise_at_start() * width / (width + data.sigma)
+    data.noise_at_start() * data.share_of_noise(pole)
 }
 
 /// Noise variance over the given one.
@@ -149,7 +148,7 @@ fn without_insignificant(data: &Data, mut at: Evaluation) -> Evaluation {
         doubtful.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
         let mut next = None;
         for (mode, [_, at_most], needed) in doubtful {
-            let without = fit_without_creeping(data, at.model.without(mode));
+            let without = fit_to_the_end(data, at.model.without(mode));
             if at_most < needed || without.chi2 - at.chi2 < needed {
                 next = Some(without);
                 break;
@@ -174,7 +173,7 @@ struct Candidate {
 /// none.
 fn with_one_more(data: &Data, at: &Evaluation, settings: &Settings) -> Option<Evaluation> {
     let noise = scale(data, at);
-    let residual = at.residuals(data);
+    let residual = weighted(data, at.residuals(data));
     let (mut all, beyond) = join(|| peaks(data, at, &residual, settings), || beyond(data, at, &residual));
     all.extend(beyond);
     all.sort_by(|a, b| (b.gain - b.needed * noise).total_cmp(&(a.gain - a.needed * noise)));
@@ -188,7 +187,7 @@ fn with_one_more(data: &Data, at: &Evaluation, settings: &Settings) -> Option<Ev
 }
 
 /// Residual terms, and poles outside the band.
-fn beyond(data: &Data, at: &Evaluation, residual: &DMatrix<f64>) -> Vec<Candidate> {
+fn beyond(data: &Data, at: &Evaluation, weighted: &DMatrix<f64>) -> Vec<Candidate> {
     let (low, high) = (data.s[0].im, data.s[data.lines() - 1].im);
     let powers = MORE_POWERS.iter().filter(|power| !at.model.powers.contains(power));
     let places = BELOW.iter().map(|times| times * low).chain(ABOVE.iter().map(|times| times * high));
@@ -210,7 +209,7 @@ fn beyond(data: &Data, at: &Evaluation, residual: &DMatrix<f64>) -> Vec<Candidat
             (gain > needed * noise).then(|| Candidate { gain, needed, model: at.model.with_power(power) })
         }
         Beyond::Pole(pole) => (gain > by_noise(2.0) * noise).then(|| {
-            let (shape, participation) = rank_one(&residues(data, residual, pole));
+            let (shape, participation) = rank_one(&residues(data, weighted, pole));
             let needed = threshold(data) * data.noise_at_start();
             Candidate { gain, needed, model: at.model.with(pole, &shape, &participation) }
         }),
@@ -220,7 +219,7 @@ fn beyond(data: &Data, at: &Evaluation, residual: &DMatrix<f64>) -> Vec<Candidat
 
 /// The peaks of the residual, strongest first: a matched filter for one mode on a grid of
 /// frequencies and dampings.
-fn peaks(data: &Data, at: &Evaluation, residual: &DMatrix<f64>, settings: &Settings) -> Vec<Candidate> {
+fn peaks(data: &Data, at: &Evaluation, weighted: &DMatrix<f64>, settings: &Settings) -> Vec<Candidate> {
     let (low, high) = (data.s[0].im, data.s[data.lines() - 1].im);
     let narrowest = (1.1 * data.sigma).max(0.5 * data.step);
     let damping = (0.5 * settings.damping_limit).min(0.06);
@@ -235,18 +234,16 @@ fn peaks(data: &Data, at: &Evaluation, residual: &DMatrix<f64>, settings: &Setti
     }
     let limit = threshold(data);
     let noise = scale(data, at);
-    let weighted = weighted(data, residual);
     let of_group = |poles: &[C]| -> Vec<(f64, f64, C)> {
-        let found =
-            filtered(data, &weighted, poles).into_iter().zip(poles).filter_map(|(filtered, &pole)| {
-                let needed = limit * correlated(data, pole);
-                // cheap test first
-                if 2.0 * filtered.norm_squared() < needed * noise {
-                    return None;
-                }
-                let gain = rank_one(&filtered).0.norm_squared();
-                (2.0 * gain > needed * noise).then_some((gain, needed, pole))
-            });
+        let found = filtered(data, weighted, poles).into_iter().zip(poles).filter_map(|(filtered, &pole)| {
+            let needed = limit * correlated(data, pole);
+            // cheap test first
+            if 2.0 * filtered.norm_squared() < needed * noise {
+                return None;
+            }
+            let gain = rank_one(&filtered).0.norm_squared();
+            (2.0 * gain > needed * noise).then_some((gain, needed, pole))
+        });
         found.collect()
     };
     let found: Vec<Vec<(f64, f64, C)>> = grid.par_chunks(GROUP).map(of_group).collect();
@@ -262,7 +259,7 @@ fn peaks(data: &Data, at: &Evaluation, residual: &DMatrix<f64>, settings: &Setti
         }
         if taken.iter().all(apart) {
             taken.push(pole);
-            let (shape, participation) = rank_one(&residues(data, residual, pole));
+            let (shape, participation) = rank_one(&residues(data, weighted, pole));
             let model = at.model.with(pole, &shape, &participation);
             peaks.push(Candidate { gain, needed, model });
         }
@@ -288,12 +285,11 @@ fn reach(data: &Data, pole: C) -> std::ops::Range<usize> {
 const GROUP: usize = 16;
 
 /// The residual times its weight.
-fn weighted(data: &Data, residual: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut weighted = residual.clone();
-    let mut halves = weighted.rows_range_pair_mut(..data.lines(), data.lines()..);
+fn weighted(data: &Data, mut residual: DMatrix<f64>) -> DMatrix<f64> {
+    let mut halves = residual.rows_range_pair_mut(..data.lines(), data.lines()..);
     halves.0.component_mul_assign(&data.weight);
     halves.1.component_mul_assign(&data.weight);
-    weighted
+    residual
 }
 
 /// By pole, output × input: the residual's correlation with a peak there, in units of its noise.
@@ -307,8 +303,8 @@ fn filtered(data: &Data, weighted: &DMatrix<f64>, poles: &[C]) -> Vec<DMatrix<C>
 }
 
 /// Output × input: the residue of a peak at this pole.
-fn residues(data: &Data, residual: &DMatrix<f64>, pole: C) -> DMatrix<C> {
-    let (sum, power) = correlations(data, &weighted(data, residual), &[pole]).swap_remove(0);
+fn residues(data: &Data, weighted: &DMatrix<f64>, pole: C) -> DMatrix<C> {
+    let (sum, power) = correlations(data, weighted, &[pole]).swap_remove(0);
     sum.zip_map(&power, |sum, power| if power > 0.0 { sum / power } else { C::from(0.0) })
 }
 

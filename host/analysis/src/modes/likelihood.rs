@@ -153,7 +153,8 @@ impl Evaluation {
     /// As [`Evaluation::new`]; `basis` may have more columns than the model, for their gradient.
     fn with_basis(data: &Data, model: Model, basis: DMatrix<f64>) -> Evaluation {
         let of_output = |o: usize| {
-            let (mut left, mut weighted) = residuals_of(data, &model, &basis, o);
+            let mut left = residuals_of(data, &model, &basis, o);
+            let mut weighted = left.clone();
             for (column, mut to) in weighted.column_iter_mut().enumerate() {
                 let weight = data.weight.column(o * data.inputs + column);
                 let (mut re, mut im) = to.rows_range_pair_mut(..data.lines(), data.lines()..);
@@ -176,7 +177,7 @@ impl Evaluation {
 
     /// The residuals, one column per cell, real parts above imaginary parts.
     pub(super) fn residuals(&self, data: &Data) -> DMatrix<f64> {
-        let of_output = |o: usize| residuals_of(data, &self.model, &self.basis, o).0;
+        let of_output = |o: usize| residuals_of(data, &self.model, &self.basis, o);
         let parts: Vec<DMatrix<f64>> = (0..data.outputs).into_par_iter().map(of_output).collect();
         let mut all = DMatrix::zeros(2 * data.lines(), data.cells());
         for (o, part) in parts.iter().enumerate() {
@@ -196,13 +197,8 @@ pub(super) fn degrees_of_freedom(data: &Data, model: &Model) -> f64 {
     (data.y.len() as f64 - model.parameters() as f64).max(1.0)
 }
 
-/// The residuals of the cells of one output, twice.
-fn residuals_of(
-    data: &Data,
-    model: &Model,
-    basis: &DMatrix<f64>,
-    output: usize,
-) -> (DMatrix<f64>, DMatrix<f64>) {
+/// The residuals of the cells of one output.
+fn residuals_of(data: &Data, model: &Model, basis: &DMatrix<f64>, output: usize) -> DMatrix<f64> {
     let n = model.poles.len();
     let (from, inputs) = (output * data.inputs, data.inputs);
     let mut coefficients = DMatrix::zeros(2 * n, inputs);
@@ -215,7 +211,7 @@ fn residuals_of(
     let mut left = data.y.columns(from, inputs).into_owned();
     left.gemm(-1.0, &basis.columns(0, 2 * n), &coefficients, 1.0);
     left.gemm(-1.0, &basis.columns(4 * n, model.powers.len()), &model.terms.columns(from, inputs), 1.0);
-    (left.clone(), left)
+    left
 }
 
 /// Segments of lines over which the weights are averaged for the normal equations: with more, the
@@ -413,8 +409,8 @@ impl Normal {
         }
     }
 
-    /// Eliminates the shapes: the factors of each output's block and of the rest, with `damping` times
-    /// a diagonal added.
+    /// Eliminates the shapes: the factors of each output's block and of the rest, with `damping`
+    /// times a diagonal added.
     pub(super) fn factors(&self, damping: f64) -> Option<Factors> {
         // relative to the values before the elimination: a pole that a residual term can imitate
         // has little information left, but must not take long steps
@@ -616,8 +612,8 @@ const CONVERGED: f64 = 1e-8;
 const ROUGH: f64 = 1e-2;
 
 /// A fit that only decides also ends when a step lowers χ² by less than this fraction of what all
-/// steps did: poles outside the band creep, and go on in the next fit.
-const CREEPING: f64 = 1e-3;
+/// steps did: poles outside the band move slowly, and go on in the next fit.
+const SLOW: f64 = 1e-3;
 
 /// The pole `to`, but no further from `from` than allowed in one step: at most half way to zero
 /// frequency and to the narrowest peak, at most twice the frequency, and with a damping ratio of at
@@ -639,16 +635,16 @@ pub(super) fn fit(data: &Data, start: Model) -> Evaluation {
 
 /// As [`fit`], but only as accurately as decisions about modes need.
 pub(super) fn fit_roughly(data: &Data, start: Model) -> Evaluation {
-    minimise(data, start, ROUGH_STEPS, ROUGH, CREEPING)
+    minimise(data, start, ROUGH_STEPS, ROUGH, SLOW)
 }
 
 /// As [`fit_roughly`], but to the end: what is left must not count as evidence for a pole that was
 /// removed.
-pub(super) fn fit_without_creeping(data: &Data, start: Model) -> Evaluation {
+pub(super) fn fit_to_the_end(data: &Data, start: Model) -> Evaluation {
     minimise(data, start, STEPS, ROUGH, 0.0)
 }
 
-fn minimise(data: &Data, mut start: Model, steps: usize, accuracy: f64, creeping: f64) -> Evaluation {
+fn minimise(data: &Data, mut start: Model, steps: usize, accuracy: f64, slow: f64) -> Evaluation {
     start.balance();
     let mut at = Evaluation::new(data, start);
     let first = at.chi2;
@@ -665,7 +661,7 @@ fn minimise(data: &Data, mut start: Model, steps: usize, accuracy: f64, creeping
                 if next.chi2 <= at.chi2 {
                     break (next, promised);
                 }
-                // below zero by rounding in nearly singular equations, which damping cures
+                // below zero by rounding in nearly singular equations: then more damping is needed
                 if (0.0..=accuracy * at.chi2_per_dof(data)).contains(&promised) {
                     return at;
                 }
@@ -678,7 +674,7 @@ fn minimise(data: &Data, mut start: Model, steps: usize, accuracy: f64, creeping
         let gain = at.chi2 - next.chi2;
         let stalled = gain <= 1e-14 * at.chi2;
         at = next;
-        if promised <= accuracy * at.chi2_per_dof(data) || stalled || gain < creeping * (first - at.chi2) {
+        if promised <= accuracy * at.chi2_per_dof(data) || stalled || gain < slow * (first - at.chi2) {
             return at;
         }
         damping = match gain / promised {

@@ -9,12 +9,12 @@
 //! with poles λ_r, shapes ψ_r at the outputs, participations ℓ_r at the inputs, and real residual
 //! matrices E_q: inertia below the band (q = −2), stiffness above it (q = 0) and, where the data
 //! show them, the next terms of the series. With an exponential window e^(−σt) the model is
-//! evaluated on the window's line, so that λ and the damping are the structure's own; nothing has to
-//! be subtracted.
+//! evaluated on the window's line, so that λ and the damping are the structure's own; nothing has
+//! to be subtracted.
 //!
 //! The steps:
 //!
-//! 1. poles of rising model orders by pLSCF, in the z-domain; also the data of a stabilisation chart;
+//! 1. poles of rising model orders by pLSCF, in the z-domain: also the stabilisation chart's data;
 //! 2. those that many orders agree on start a maximum-likelihood fit of all parameters;
 //! 3. modes without evidence are removed, peaks of the residual are added and tested, until nothing
 //!    changes;
@@ -49,7 +49,7 @@ mod evidence;
 mod likelihood;
 mod plscf;
 #[cfg(test)]
-mod rigs;
+mod random_rigs;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -102,9 +102,9 @@ pub struct DrivingPoint {
 #[non_exhaustive]
 pub enum Scaling {
     /// Modal A is one: at driving points shape and participation are equal (up to the sign), so
-    /// that X(s) = Σ_r [φ_r φ_rᵀ/(s − λ_r) + conjugate], φ in √(m/(N s)). Multiplied by √(2 i ω_d), with
-    /// ω_d = Im λ, φ of a mode in phase is scaled to unit modal mass (1/√kg, up to a sign): the
-    /// residue of such a mode is φφᵀ/(2 i ω_d m).
+    /// that X(s) = Σ_r [φ_r φ_rᵀ/(s − λ_r) + conjugate], φ in √(m/(N s)). Multiplied by
+    /// √(2 i ω_d), with ω_d = Im λ, φ of a mode in phase is scaled to unit modal mass (1/√kg, up to
+    /// a sign): the residue of such a mode is φφᵀ/(2 i ω_d m).
     UnitModalA,
     /// The largest component of the shape is one; the participation has the residue's unit,
     /// m/(N s).
@@ -207,8 +207,8 @@ pub struct Modes {
     pub band: Band,
     /// The modes with their peaks in the band, rising.
     pub modes: Vec<Mode>,
-    /// Poles that are part of the model but not modes: outside the band, too near to its ends for the
-    /// peak to be seen on both sides, or damped beyond the limit. They describe the data; their
+    /// Poles that are part of the model but not modes: outside the band, too near to its ends for
+    /// the peak to be seen on both sides, or damped beyond the limit. They describe the data; their
     /// values are not those of modes.
     pub background: Vec<Mode>,
     /// The residual terms, lowest power first.
@@ -280,8 +280,8 @@ impl Modes {
     /// frequencies, with the same scale as measured ones.
     ///
     /// # Errors
-    /// [`FrfError`] for frequencies that are not rising, or below zero; at s = 0 the inertia term is
-    /// infinite, so that the values there are not finite.
+    /// [`FrfError`] for frequencies that are not rising, or below zero; at s = 0 the inertia term
+    /// is infinite, so that the values there are not finite.
     pub fn synthesise(
         &self,
         frequency_hz: Vec<f64>,

@@ -1,4 +1,4 @@
-use super::rigs::{Rig, compare};
+use super::random_rigs::{Rig, compare};
 use super::*;
 use nalgebra::Complex;
 use proptest::prelude::*;
@@ -107,8 +107,8 @@ fn two_masses_are_exact() {
     assert!(mac(&found.modes[0].shape, &found.modes[1].shape) < EXACT);
 }
 
-/// Poles of three masses of 2, 1.2 and 0.8 kg on springs of 2.2, 1.5 and 1.1 N/µm with dampers of 18,
-/// 4 and 1 N s/m, by numpy's eigenvalues of the state matrix.
+/// Poles of three masses of 2, 1.2 and 0.8 kg on springs of 2.2, 1.5 and 1.1 N/µm with dampers of
+/// 18, 4 and 1 N s/m, by numpy's eigenvalues of the state matrix.
 const REFERENCE: [C; 3] = [
     C::new(-0.896_015_795_693_312_4, 579.099_442_215_002),
     C::new(-3.421_855_655_879_170_4, 1_288.363_407_422_295),

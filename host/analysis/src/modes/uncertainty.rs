@@ -22,19 +22,14 @@ use std::f64::consts::TAU;
 /// where d = σ − Re λ, and the noise's power falls as e^(−2σt). With u = d/(d + σ) and the noise's
 /// power q at the start of a record, ∫h²e^(−2σt) over ∫h² is q u (2u² − 2u + 1).
 fn correlated_pole(data: &Data, pole: C) -> f64 {
-    let u = share(data, pole);
+    let u = data.share_of_noise(pole);
     data.noise_at_start() * u * (2.0 * u * u - 2.0 * u + 1.0)
 }
 
 /// As [`correlated_pole`] for a residue, whose weight is h(t) = (1 − dt) e^(−dt).
 fn correlated_residue(data: &Data, pole: C) -> f64 {
-    let u = share(data, pole);
+    let u = data.share_of_noise(pole);
     data.noise_at_start() * u * (2.0 - 2.0 * u + u * u)
-}
-
-fn share(data: &Data, pole: C) -> f64 {
-    let d = data.half_width(pole);
-    d / (d + data.sigma)
 }
 
 /// The modes in rising frequency and the residual terms; none if the data do not determine them.

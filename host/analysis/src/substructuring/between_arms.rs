@@ -149,8 +149,8 @@ pub enum NoStiffness {
 }
 
 /// Decides between the outcome of [`fit`](super::fit::fit) and the recommended estimate for the
-/// same band and modes; `None` if one was not made. `below` fits the lines of [`BELOW`]; it is called
-/// if there is a stiffness to be confirmed.
+/// same band and modes; `None` if one was not made. `below` fits the lines of [`BELOW`]; it is
+/// called if there is a stiffness to be confirmed.
 ///
 /// # Errors
 /// [`NoStiffness`] if neither holds, or both contradict each other.
@@ -308,7 +308,7 @@ mod tests {
     fn the_assembly_alone_does_not_answer_where_no_fit_looked_at_its_model() {
         let other = averaged(26e6, 0.4e6, 0.1e6);
         for fit in [None, Some(Err(&FitError::NoMinimum))] {
-            let why = decided(fit, Some(&other)).expect_err("nobody looked").to_string();
+            let why = decided(fit, Some(&other)).expect_err("no fit was made").to_string();
             assert!(why.contains("measure A and B alone"), "{why}");
         }
     }

@@ -37,9 +37,9 @@ fn vector(rng: &mut Rng, count: usize) -> DVector<C> {
 
 impl Rig {
     /// 2 to 8 modes of 50 to 1000 Hz with 0.1 to 5 % of damping, every third one next to another
-    /// (0.5 to 3 half-power widths apart), 3 to 12 outputs, 1 to 6 inputs, a rigid-body mode below the
-    /// band and two modes above it; noise of 3e-3 to 0.3 of the median peak; with the campaign's
-    /// window or without one.
+    /// (0.5 to 3 half-power widths apart), 3 to 12 outputs, 1 to 6 inputs, a rigid-body mode below
+    /// the band and two modes above it; noise of 3e-3 to 0.3 of the median peak; with the
+    /// campaign's window or without one.
     pub(super) fn random(seed: u64) -> Rig {
         let mut rng = Rng::seed_from_u64(seed);
         let modes = rng.random_range(2..=8);
