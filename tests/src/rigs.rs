@@ -3,7 +3,7 @@
 
 use jointrig::campaign::plan::CONTACT_BY_HAND;
 use jointrig_hil_sim::rig::RigConfig;
-use jointrig_hil_sim::rig::config::{Beam, BodyName, Bushing, ContactLaw, Errors, ResponsePoint};
+use jointrig_hil_sim::rig::config::{Beam, Bushing, ContactLaw, Errors};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -50,8 +50,7 @@ impl Default for Drawn {
     }
 }
 
-/// The rig with this number. A third of the rigs also have a clamp on side B. Specimen B has the
-/// marks M1 and M2: those of specimen A, mirrored.
+/// The rig with this number. A third of the rigs also have a clamp on side B.
 ///
 /// Contacts of 60 N/µm and more, clamps × 0.3…3, local yaw modes at about 100…350 Hz, arms × 0.6…2,
 /// rods, load cells, suspensions, damping, and floors × 0.3…3: each drawn independently.
@@ -88,7 +87,6 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         rig.clamp_b.rigid = false;
         clamp(&mut rig.clamp_b.loaded, -1.0, [2.0, 20.0]);
     }
-    mirror_marks(&mut rig);
     for specimen in [&mut rig.bodies.specimen_a, &mut rig.bodies.specimen_b] {
         let factor = between(0.7, 1.5);
         specimen.mass_kg *= factor;
@@ -135,19 +133,6 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         rig = elastic(number, rig, which);
     }
     if drawn.accelerometers { with_accelerometers(rig, drawn.errors) } else { rig }
-}
-
-/// Adds the marks of specimen A, mirrored, to specimen B.
-fn mirror_marks(rig: &mut RigConfig) {
-    let of_a = rig.responses.iter().filter(|point| point.name.starts_with('N'));
-    let mirrored = of_a.map(|point| ResponsePoint {
-        name: point.name.replace('N', "M"),
-        body: BodyName::SpecimenB,
-        position_m: [point.position_m[0], -point.position_m[1], point.position_m[2]],
-        ..*point
-    });
-    let mirrored: Vec<_> = mirrored.collect();
-    rig.responses.extend(mirrored);
 }
 
 /// The same rig with specimens, or specimens and arms, of steel or aluminium that bend; masses
@@ -268,34 +253,6 @@ pub fn with_priors(plan: &str, rig: &RigConfig) -> String {
     )
 }
 
-/// The same plan with two marks next to the contact on each specimen, placed as accurately as the
-/// spots: N1 and N2, M1 and M2.
-pub fn near_plan(rig: &RigConfig) -> String {
-    let near: Vec<&ResponsePoint> = rig.responses.iter().filter(|point| point.sigma_m.is_some()).collect();
-    contact_plan(rig)
-        .replace("\"C1\", \"C2\"", &format!("{}\"C1\", \"C2\"", names(&near)))
-        .replace("response = [\n", &format!("response = [\n{}", rows(&near)))
-}
-
-/// Names as in a plan's list, each followed by its separator.
-fn names(points: &[&ResponsePoint]) -> String {
-    points.iter().map(|point| format!("\"{}\", ", point.name)).collect::<Vec<_>>().concat()
-}
-
-/// The same points on specimens, as rows of a plan's geometry.
-fn rows(points: &[&ResponsePoint]) -> String {
-    let row = |p: &&ResponsePoint| {
-        let [x, y, z] = p.position_m;
-        let grouping = if p.body == BodyName::SpecimenB { 6 } else { 5 };
-        let sigma_m = p.sigma_m.map(|sigma_m| format!(", sigma_m = {sigma_m:?}")).unwrap_or_default();
-        format!(
-            "    {{ name = \"{}\", grouping = {grouping}, position_m = [{x:?}, {y:?}, {z:?}]{sigma_m} }},\n",
-            p.name
-        )
-    };
-    points.iter().map(row).collect::<Vec<_>>().concat()
-}
-
 /// Frequencies of the shaker's levels on such a rig, Hz.
 pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
 
@@ -333,9 +290,6 @@ mod tests {
             for body in [&mut bodies.specimen_a, &mut bodies.specimen_b, &mut bodies.arm_a, &mut bodies.arm_b]
             {
                 assert!(body.beam.take().is_some());
-            }
-            for name in ["N1", "N2", "M1", "M2"] {
-                assert!(same.responses.iter().any(|point| point.name == name), "{number} {name}");
             }
             assert_eq!(same, rigid, "{number}");
         }

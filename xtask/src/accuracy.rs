@@ -16,8 +16,6 @@ struct Source {
     package: &'static str,
     module: &'static str,
     test: &'static str,
-    /// The part of it that the page shows.
-    part: Option<(&'static str, &'static str)>,
 }
 
 const fn source(
@@ -26,18 +24,14 @@ const fn source(
     module: &'static str,
     test: &'static str,
 ) -> Source {
-    Source { table, package, module, test, part: None }
+    Source { table, package, module, test }
 }
 
-const SOURCES: [Source; 13] = [
+const SOURCES: [Source; 12] = [
     source("contact", "jointrig-tests", "contact_accuracy", "accuracy_of_the_contacts_own_stiffness"),
     source("validation", "jointrig-tests", "contact_validation", "rigs_not_used_in_development"),
     source("false-assumptions", "jointrig-tests", "contact_validation", "false_assumptions"),
     source("bending", "jointrig-tests", "contact_accuracy", "contacts_of_specimens_that_bend"),
-    Source {
-        part: Some(("PLAN", "1")),
-        ..source("marks", "jointrig-tests", "contact_accuracy", "marks_beside_the_contact")
-    },
     source("accelerometers", "jointrig-tests", "contact_accuracy", "accelerometers_in_place_of_lasers"),
     source(
         "slip",
@@ -90,7 +84,7 @@ fn printed(project: &Project, source: &Source) -> Result<(String, bool)> {
     cargo.args(["test", "--release", "--package", source.package, "--test", "it", "--"]);
     let test = format!("{}::{}", source.module, source.test);
     cargo.args(["--ignored", "--exact", &test, "--nocapture"]);
-    cargo.envs(source.part).stdout(Stdio::piped());
+    cargo.stdout(Stdio::piped());
     println!("  $ {}", command::line(&cargo));
     let mut test = cargo.spawn().context("cargo cannot be started")?;
     let mut lines = Vec::new();

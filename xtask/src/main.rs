@@ -93,7 +93,7 @@ enum Task {
     /// Run the campaigns with known truth (under two hours), and write the tables of
     /// docs/accuracy.md.
     Accuracy {
-        /// Compute only these tables: contact, marks, slip, levels, between-arms,
+        /// Compute only these tables: contact, slip, levels, between-arms,
         /// between-arms-campaigns, recommended, methods, fit.
         tables: Vec<String>,
     },

@@ -127,7 +127,7 @@ impl Rig {
         // check() has verified that there is at least one of each.
         let (impact, response) = (&config.impacts[0], &config.responses[0]);
         let words = [configuration.as_str(), &impact.name, &response.name];
-        let aim = Aim::new(seed, words, &config.errors, impact, response);
+        let aim = Aim::new(seed, words, &config.errors, impact, response, false);
         let (stepper, slipping) = plants[configuration as usize].aimed(config, &flaws, &aim, &channels)?;
         let mut rig = Self {
             seed,
@@ -210,7 +210,9 @@ impl Rig {
         let hit = self.config.impact(configuration, impact)?;
         let seen = self.config.response(configuration, response)?;
         let words = [configuration.as_str(), impact, response];
-        let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen);
+        let mark = self.config.spots.mark.as_ref();
+        let at_mark = configuration == Configuration::B && mark.is_some_and(|mark| mark.name == response);
+        let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen, at_mark);
         let speckle = seen.speckle;
         let drifted = (configuration == Configuration::Ajb && self.config.contact.drifts()).then(|| {
             let contact = self.config.contact.drifted(self.total_hits, self.time_s(self.total_scans));

@@ -88,6 +88,10 @@ impl Plant {
         let errors = config.errors.acting();
         let spot =
             |name, spot| velocity(&Probe::at(spot, errors.tilted(name, sliding))).unwrap_or_else(nothing);
+        let [spot_a, spot_b] = match &aim.at_mark {
+            Some([a, b]) => [a, b],
+            None => [&flaws.spots.ldv_a, &flaws.spots.ldv_b],
+        };
         // A load cell's signal is its spring force kz · z on the body that it supports, with z
         // relative to the body that it stands on.
         let cells = self.structure.load_cells(config);
@@ -119,8 +123,8 @@ impl Plant {
                 seen(x)?,
                 seen(y)?,
                 seen(z)?,
-                spot("ldv_a", &flaws.spots.ldv_a),
-                spot("ldv_b", &flaws.spots.ldv_b),
+                spot("ldv_a", spot_a),
+                spot("ldv_b", spot_b),
                 cell(0),
                 cell(1),
                 cell(2),

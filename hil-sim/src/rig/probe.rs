@@ -57,12 +57,18 @@ impl ImpactPoint {
 }
 
 impl RigConfig {
+    /// All response points: the list, then the mark for all lasers if the list does not contain it.
+    pub fn response_points(&self) -> impl Iterator<Item = &ResponsePoint> {
+        let listed = |mark: &&ResponsePoint| self.responses.iter().any(|point| point.name == mark.name);
+        self.responses.iter().chain(self.spots.mark.iter().filter(move |mark| !listed(mark)))
+    }
+
     /// The response point `name`, if `configuration` has it.
     ///
     /// # Errors
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
-        let there = || self.responses.iter().filter(|point| self.has(configuration, point.body));
+        let there = || self.response_points().filter(|point| self.has(configuration, point.body));
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "response",
             name: name.to_owned(),
@@ -93,16 +99,20 @@ pub struct Aim {
     pub impact: Probe,
     /// Where the 3-D vibrometer measures, along x, y and z.
     pub response: [Probe; 3],
+    /// Where the vibrometers of spots A and B measure, if they are aimed at the same mark.
+    pub at_mark: Option<[Spot; 2]>,
 }
 
 impl Aim {
-    /// Geometry of the cell `words` = (configuration, impact, response).
+    /// Geometry of the cell `words` = (configuration, impact, response); with `at_mark`, the
+    /// vibrometers of the spots are aimed at the response point too, once for all its cells.
     pub fn new(
         seed: u64,
         words: [&str; 3],
         errors: &Errors,
         impact: &ImpactPoint,
         response: &ResponsePoint,
+        at_mark: bool,
     ) -> Self {
         let errors = errors.acting();
         let [configuration, hit, seen] = words;
@@ -123,11 +133,8 @@ impl Aim {
         };
         let own_m = response.sigma_m.filter(|_| !errors.none);
         let seen_sigma_m = own_m.unwrap_or(seen_sigma_m);
-        let seen_m = shifted(
-            shifted(errors.moved(seen, response.position_m), seen_sigma_m, &mut seen_point),
-            aim_m,
-            &mut response_aim,
-        );
+        let point_m = shifted(errors.moved(seen, response.position_m), seen_sigma_m, &mut seen_point);
+        let seen_m = shifted(point_m, aim_m, &mut response_aim);
         let mut hammer = stream(seed, &["hammer angle", hit]);
         let stated = errors.tilted("hammer", impact.probe().direction);
         let direction = tilted(stated, errors.hammer_angle_rad, &mut hammer);
@@ -137,6 +144,12 @@ impl Aim {
                 body: response.body,
                 position_m: seen_m,
                 direction: errors.tilted("vibrometer", axis),
+            }),
+            at_mark: at_mark.then(|| {
+                ["ldv_a", "ldv_b"].map(|laser| Spot {
+                    body: response.body,
+                    position_m: shifted(point_m, aim_m, &mut stream(seed, &["aim at the mark", laser])),
+                })
             }),
         }
     }

@@ -503,6 +503,7 @@ impl Flaws {
             spots: Spots {
                 ldv_a: spot("ldv_a", &config.spots.ldv_a),
                 ldv_b: spot("ldv_b", &config.spots.ldv_b),
+                mark: config.spots.mark.clone(),
             },
             gains,
             skews_s,

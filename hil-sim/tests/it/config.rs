@@ -24,7 +24,7 @@ fn the_default_file_is_complete_and_is_the_default() {
     assert_eq!(alone, RigConfig::default());
     assert_eq!(RigConfig::from_toml("").unwrap(), RigConfig::default());
     assert_eq!(RigConfig::from_toml(&alone.to_toml()).unwrap(), alone);
-    assert_eq!((alone.responses.len(), alone.impacts.len()), (23, 21));
+    assert_eq!((alone.responses.len(), alone.impacts.len()), (25, 21));
 }
 
 #[test]

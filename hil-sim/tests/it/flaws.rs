@@ -315,3 +315,54 @@ fn half_the_step_changes_the_force_of_a_varying_load_little() {
     let half = taken(&config);
     assert!(whole > 0.0 && (whole / half - 1.0).abs() < 1e-4, "{whole} {half}");
 }
+
+/// Hits B alone; the true velocities of the 3-D vibrometer along z and of both spots' vibrometers.
+fn at_the_mark(rig: &mut Rig, response: &str) -> Vec<[f64; 3]> {
+    rig.stage(Configuration::B, "BZ1", response, 0).unwrap();
+    rig.fire(3.5e-3);
+    let mut codes = [0; CHANNELS];
+    (0..2000)
+        .map(|_| {
+            rig.scan(&mut codes);
+            [rig.truth()[3], rig.truth()[4], rig.truth()[5]]
+        })
+        .collect()
+}
+
+#[test]
+fn at_the_mark_on_b_alone_all_lasers_see_one_motion() {
+    let mut rig = Rig::new(&perfect(), 8).unwrap();
+    let seen = at_the_mark(&mut rig, "BL");
+    assert!(seen.iter().any(|[z, ..]| z.abs() > 1e-5));
+    assert!(seen.iter().all(|[z, a, b]| z == a && z == b));
+    // at other points of B alone they are on their spots, and specimen A is absent
+    let seen = at_the_mark(&mut rig, "B2");
+    assert!(seen.iter().all(|[_, a, _]| *a == 0.0) && seen.iter().any(|[z, _, b]| z != b));
+    // in the assembly too
+    rig.stage(Configuration::Ajb, "AZ1", "BL", 0).unwrap();
+    rig.fire(3.5e-3);
+    let mut codes = [0; CHANNELS];
+    let apart = (0..2000).any(|_| {
+        rig.scan(&mut codes);
+        rig.truth()[4] != rig.truth()[3]
+    });
+    assert!(apart);
+    // each laser is aimed once, within `aim_m` of the mark
+    let mut config = perfect();
+    config.errors.aim_m = 1e-3;
+    let mut rig = Rig::new(&config, 8).unwrap();
+    let seen = at_the_mark(&mut rig, "BL");
+    let off = |of: usize| seen.iter().map(|v| (v[of] - v[0]).abs()).fold(0.0, f64::max);
+    let most = seen.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
+    assert!(off(1) > 0.0 && off(2) > 0.0 && off(1) < 0.2 * most && off(2) < 0.2 * most);
+}
+
+#[test]
+fn a_listed_response_with_the_marks_name_says_where_it_is() {
+    let listed = "responses = [{ name = \"BL\", body = \"arm_b\", position_m = [0.01, -0.03, 0.03] }]";
+    let config = RigConfig::from_toml(listed).unwrap();
+    let own = config.response(Configuration::B, "BL").unwrap();
+    assert_eq!(own.position_m, [0.01, -0.03, 0.03]);
+    assert_eq!(config.response_points().count(), 1);
+    assert_eq!(RigConfig::from_toml("").unwrap().response_points().filter(|p| p.name == "BL").count(), 1);
+}

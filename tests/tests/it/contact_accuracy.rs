@@ -8,7 +8,7 @@ use jointrig::results::Results;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table};
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
-use jointrig_tests::rigs::{Drawn, Elastic, by_hand_plan, contact_plan, near_plan};
+use jointrig_tests::rigs::{Drawn, Elastic, by_hand_plan, contact_plan};
 use jointrig_tests::slip_truth::slid;
 use std::path::Path;
 
@@ -237,22 +237,6 @@ fn a_contact_that_may_slip_has_its_stuck_stiffness_or_none() {
     // only the stuck stiffness may be called k_T
     let other = rows.iter().filter(|row| !row.stiffness.covers()).count();
     assert!(20 * other <= rows.len().max(20), "{rows:?}");
-}
-
-#[test]
-#[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: marks beside the contact"]
-fn marks_beside_the_contact() {
-    let (first, rigs, seeds) = (count("FIRST", 100), count("RIGS", 24), count("SEEDS", 3));
-    let like = Drawn { errors: 0.5, gain: 0.0, ..Drawn::default() };
-    let plans: [(&str, Plan); 2] =
-        [("`contact.toml`", contact_plan), ("with the marks N1, N2, M1 and M2", near_plan)];
-    let plans = plans.iter().enumerate().filter(|(n, _)| count("PLAN", *n as u64) == *n as u64);
-    let mut rows = Vec::new();
-    for (_, (name, plan)) in plans {
-        println!("{name}");
-        rows.extend(lines(name, &campaigns(first, rigs, seeds, like, |campaign| told_of(campaign, *plan))));
-    }
-    print_table("marks", &columns("points"), &rows);
 }
 
 /// The first `rigs` numbers from `first` on whose rigs have no clamp on side B.

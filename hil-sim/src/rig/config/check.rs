@@ -124,7 +124,7 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
         }
     }
     let points = || {
-        let named = config.responses.iter().map(|point| &point.name);
+        let named = config.response_points().map(|point| &point.name);
         named.chain(config.impacts.iter().map(|point| &point.name))
     };
     for (name, offset_m) in &errors.offset_m {
@@ -285,6 +285,10 @@ fn points(config: &RigConfig) -> Result<(), RigError> {
             ));
         }
     }
+    if let Some(mark) = &config.spots.mark {
+        finite("spots.mark.position_m", &mark.position_m)?;
+        not_negative("spots.mark.sigma_m", mark.sigma_m.unwrap_or_default())?;
+    }
     finite("spots.ldv_a.position_m", &config.spots.ldv_a.position_m)?;
     finite("spots.ldv_b.position_m", &config.spots.ldv_b.position_m)?;
     finite("shaker.position_m", &config.shaker.position_m)?;
@@ -427,7 +431,7 @@ pub(super) fn check_fixed(config: &RigConfig) -> Result<(), RigError> {
             return Err(bad(&field("name"), &format!("`{name}` is another channel's name")));
         }
         taken.push(name.clone());
-        if !config.responses.iter().any(|point| point.name == own.response) {
+        if !config.response_points().any(|point| point.name == own.response) {
             return Err(bad(
                 &field("response"),
                 &format!("`{}` is not one of the rig's responses", own.response),

@@ -348,6 +348,11 @@ pub struct Spots {
     pub ldv_a: Spot,
     /// On specimen B.
     pub ldv_b: Spot,
+    /// A mark at which both vibrometers are aimed while the 3-D vibrometer measures it on
+    /// substructure B alone; in the assembly they stay on their spots. It is one more response
+    /// point; if `responses` contains its name, that entry says where it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mark: Option<ResponsePoint>,
 }
 
 /// The shaker: a force along the sliding direction.

@@ -142,7 +142,7 @@ impl Measurements for Assembly {
             config.impact(Configuration::Ajb, &cell.impact).expect("the workbook's impacts are the rig's");
         let response = config.response(Configuration::Ajb, &cell.response).expect("and its responses");
         let words = ["AJB", cell.impact.as_str(), cell.response.as_str()];
-        let aim = Aim::new(self.seed, words, &config.errors, impact, response);
+        let aim = Aim::new(self.seed, words, &config.errors, impact, response, false);
         let column = self.row(&aim.impact);
         // generalised motion per newton of this hit
         let motion: Vec<DVector<C>> = self.compliance.iter().map(|y| y * &column).collect();

@@ -113,7 +113,7 @@ fn simulate(
         for channel in &points.channels {
             let to = config.response(configuration, &channel.name).expect("and its responses");
             let words = [configuration.as_str(), impact.name.as_str(), channel.name.as_str()];
-            let aim = Aim::new(seed, words, &config.errors, at, to);
+            let aim = Aim::new(seed, words, &config.errors, at, to, false);
             let axis = channel.direction.iter().position(|d| *d == 1.0).expect("channels along the axes");
             outputs.push(structure.row(&aim.response[axis]).expect("its body is there"));
             inputs.push(structure.row(&aim.impact).expect("its body is there"));
