@@ -183,6 +183,11 @@ pub trait Measurements: Sync {
         false
     }
 
+    /// Whether on B alone the vibrometers near the contact are aimed at this response point too.
+    fn has_all_lasers(&self, _point: &str) -> bool {
+        false
+    }
+
     /// The masses of the fixed sensors, as far as the plan states them.
     fn sensor_masses(&self) -> Vec<SensorMass> {
         Vec::new()

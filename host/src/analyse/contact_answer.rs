@@ -70,6 +70,7 @@ pub fn cells<'a, M: Measurements>(
             point_grouping: point.grouping,
             axes: Axes::new(&own().map(|p| p.direction).collect::<Vec<_>>())?,
             fixed: measurements.is_fixed(&point.name),
+            lasers: measurements.has_all_lasers(&point.name),
             records: &average.records,
             spectra,
             quantity: measurements.quantity(),

@@ -114,6 +114,7 @@ fn one(plan: &Plan, geometry: &Geometry, contact_n_per_m: f64) -> Option<Expecte
             point_grouping: point.grouping,
             axes,
             fixed: cell.fixed,
+            lasers: plan.response(&point.name).is_some_and(|point| point.lasers),
             records,
             spectra: &cell.spectra,
             quantity: if cell.fixed { MotionQuantity::Acceleration } else { MotionQuantity::Velocity },
@@ -204,20 +205,28 @@ impl Simulation<'_> {
                 .map(|l| if place < outputs.len() { value(l, place, 1) } else { 0.0.into() })
                 .collect()
         };
-        let of_spots = self.spots.map(|_| [spot(1), spot(0)]);
+        let at_contact = self.spots.map(|_| [spot(1), spot(0)]);
 
         let mut shared: Option<(i64, Vec<Hits>)> = None;
         let mut from = 0;
         for name in names {
             let axes = points.iter().filter(|p| p.name == name.response).count();
             let fixed = plan.own_channels(&name.response).is_some();
+            // on B alone both vibrometers may be aimed at the point, along z
+            let together = of == Structure::B && plan.response(&name.response).is_some_and(|own| own.lasers);
+            let at_point = || -> Option<[Vec<Complex<f64>>; 2]> {
+                let mut own = (from..from + axes).filter(|place| outputs[*place].direction[2] > 0.9);
+                let z = own.next()?;
+                Some([0, 1].map(|_| lines.clone().map(|l| value(l, z, 1)).collect()))
+            };
+            let of_spots = if together { at_point() } else { at_contact.clone() };
             let (order, floor) = match (fixed, axes) {
                 (false, _) => (1, rig.sensors.vibrometer.floor),
                 (true, 1) => (2, SINGLE_FLOOR),
                 (true, _) => (2, TRIAXIAL_FLOOR),
             };
             // v_A, v_B and T are those of the hits, which all fixed sensors share
-            let (hits, at_contact) = if let Some(set) = shared.clone().filter(|_| fixed) {
+            let (hits, beside) = if let Some(set) = shared.clone().filter(|_| fixed) {
                 set
             } else {
                 self.sets += 1;
@@ -229,14 +238,14 @@ impl Simulation<'_> {
                 (self.sets, signals)
             };
             if fixed {
-                shared = Some((hits, at_contact.clone()));
+                shared = Some((hits, beside.clone()));
             }
             let mut all: Vec<Hits> = Vec::new();
             for output in from..from + axes {
                 let exact: Vec<Complex<f64>> = lines.clone().map(|l| value(l, output, order)).collect();
                 all.push(self.noisy(&exact, floor));
             }
-            all.extend(at_contact);
+            all.extend(beside);
             from += axes;
             let wanted = plan.hits.get_ref().wanted as usize;
             let sums = |hits: &Hits| OutputSums {

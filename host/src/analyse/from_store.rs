@@ -490,6 +490,10 @@ impl Measurements for CampaignFile {
         self.plan.own_channels(point).is_some()
     }
 
+    fn has_all_lasers(&self, point: &str) -> bool {
+        self.plan.response(point).is_some_and(|point| point.lasers)
+    }
+
     fn sensor_masses(&self) -> Vec<SensorMass> {
         let points = self.plan.geometry.response.iter().map(toml::Spanned::get_ref);
         let own = |point: &ResponsePoint| {

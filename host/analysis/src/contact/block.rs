@@ -64,6 +64,9 @@ pub struct BlockCell {
     pub axes: Vec<Axis>,
     /// Index of the point's first coordinate among the parameters.
     pub point: usize,
+    /// If the vibrometers of the spots are aimed at this point: index of x and y of that of spot A
+    /// relative to the point, then of spot B.
+    pub lasers: Option<usize>,
     /// Index of the cell's own aim error (three parameters), if it has one.
     pub aim: Option<usize>,
     /// Index of the two aim errors of the hammer, if any.
@@ -182,7 +185,14 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
                 let position = parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
                     Parameter::new(format!("{axis} of point {}", cell.point), start, sigma, cause)
                 }));
-                MeasuredPoint { position, axes }
+                let aim = |laser: &str, axis: &str| {
+                    let name = format!("{axis} of the aim of spot {laser}'s vibrometer at {}", cell.point);
+                    Parameter::new(name, 0.0, input.priors.positions.aim_m, Cause::Aim)
+                };
+                let lasers = (cell.lasers && impact.structure == Structure::B).then(|| {
+                    parameters.add(["A", "B"].into_iter().flat_map(|of| [aim(of, "x"), aim(of, "y")]))
+                });
+                MeasuredPoint { position, axes, lasers }
             });
         }
     }
@@ -216,6 +226,8 @@ struct MeasuredPoint {
     position: usize,
     /// The axes of its sensor.
     axes: Vec<Axis>,
+    /// As in [`BlockCell::lasers`], on B alone.
+    lasers: Option<usize>,
 }
 
 /// The axes of a cell's sensor, with the parameters of a fixed one.
@@ -368,8 +380,10 @@ fn block(
     };
     let (mut cells, mut rows, mut lines) = (Vec::new(), Vec::new(), Vec::<CellValues>::new());
     for (place, (group, cell)) in impact.cells.iter().enumerate() {
-        let MeasuredPoint { position: point, axes } = points[&(*group, cell.point)].clone();
+        let MeasuredPoint { position: point, axes, lasers } = points[&(*group, cell.point)].clone();
+        let lasers = lasers.filter(|_| alone);
         own.extend(point..point + 3);
+        own.extend(lasers.into_iter().flat_map(|at| at..at + 4));
         own.extend(axes.iter().flat_map(|axis| [axis.gain, axis.delay]));
         own.extend(axes.iter().filter_map(|axis| axis.across).flat_map(|(at, _)| at..at + 2));
         // the first cell with the same hits
@@ -391,11 +405,16 @@ fn block(
         };
         own.extend(aimed.into_iter().flat_map(|at| at..at + 3));
         own.extend(shift.into_iter().flat_map(|at| at..at + 2));
-        let spots = if cell.has_spots() && first.is_none() { spots.clone() } else { 0..0 };
+        let spots = match lasers {
+            _ if !cell.has_spots() || first.is_some() => 0..0,
+            Some(_) => 1..3,
+            None => spots.clone(),
+        };
         let of_all = (first.is_none()).then_some(0).into_iter().chain(spots);
         let channels = of_all.chain(POINT..POINT + axes.len());
         rows.extend(channels.map(|channel| ChannelRow { cell: place, channel }));
-        cells.push(BlockCell { group: *group, axes, point, aim: aimed, shift, unexplained: [0.0; 2] });
+        let (group, unexplained) = (*group, [0.0; 2]);
+        cells.push(BlockCell { group, axes, point, lasers, aim: aimed, shift, unexplained });
         lines.push(cell_values(cell, chosen, input.band_hz)?);
     }
     pool_lines(&mut lines).ok_or_else(|| ContactError::SingleHits { impact: impact.name.into() })?;
@@ -509,6 +528,9 @@ pub struct ContactCell<'a> {
     /// Whether a sensor is fixed to the point, with its own gains and delays; otherwise the 3-D
     /// vibrometer visits it.
     pub fixed: bool,
+    /// Whether on B alone the vibrometers of the spots are aimed at the point too, which compares
+    /// their gains with the 3-D vibrometer's.
+    pub lasers: bool,
     /// The records averaged: cells of one impact that share a record have the same hits.
     pub records: &'a [i64],
     /// The point's motion along its axes, then the velocity of the spots on A and B along z (m/s)

@@ -129,6 +129,7 @@ fn input<'a>(cells: &'a [Cell], keep: impl Fn(&Cell) -> bool) -> Input<'a> {
         point_grouping: if cell.on_a { Grouping::SpecimenA } else { Grouping::InterfaceB },
         axes: Axes::new(SENSORS[cell.sensor].1).expect("one to three"),
         fixed: true,
+        lasers: false,
         records: &cell.records,
         spectra: &cell.spectra,
         quantity: MotionQuantity::Acceleration,

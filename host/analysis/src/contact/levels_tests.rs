@@ -157,6 +157,7 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
             spectra: &own.spectra,
             axes: Axes::XYZ,
             fixed: false,
+            lasers: false,
             records: &[],
             quantity: MotionQuantity::Velocity,
         }

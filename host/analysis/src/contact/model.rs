@@ -215,9 +215,14 @@ impl<'a> LineModel<'a> {
         }
     }
 
-    /// Spot A or B along z, without its sensor: the body's z at the contact, its rotations, the
-    /// spot's position.
-    fn spot(&self, of_a: bool) -> (Linear, [usize; 3], [f64; 3]) {
+    /// What the vibrometer of spot A or B measures along z, without its sensor: the body's z at the
+    /// contact, its rotations, the place on it.
+    fn spot(&self, cell: &BlockCell, of_a: bool) -> (Linear, [usize; 3], [f64; 3]) {
+        if let Some(aim) = cell.lasers {
+            let aim = aim + if of_a { 0 } else { 2 };
+            let at = |axis: usize| self.p[cell.point + axis] + self.p[aim + axis];
+            return (unit(2), [3, 4, 5], [at(0), at(1), 0.0]);
+        }
         let at = SPOTS + if of_a { 0 } else { 2 };
         let place = [self.p[at], self.p[at + 1], 0.0];
         if of_a {
@@ -257,7 +262,7 @@ impl<'a> LineModel<'a> {
         match channel {
             0 => self.t,
             1 | 2 => {
-                let (z, theta, place) = self.spot(channel == 2);
+                let (z, theta, place) = self.spot(&self.block.cells[cell], channel == 2);
                 let factor = self.of_spot(2 - channel);
                 let bulk = factor * self.bulk_of_spot(channel == 2).value[(2, 2)];
                 sum(&[(factor, &turned(&z, theta, place, 2)), (bulk, &self.force[2])])
@@ -338,11 +343,18 @@ impl<'a> LineModel<'a> {
                     let spot = 2 - row.channel;
                     sensor(GAINS + spot, DELAYS + spot, &mut own);
                     let factor = self.of_spot(spot);
-                    let (_, theta, _) = self.spot(of_a);
-                    let at = SPOTS + if of_a { 0 } else { 2 };
+                    let (_, theta, _) = self.spot(cell, of_a);
+                    let laser = if of_a { 0 } else { 2 };
                     let bulk = self.bulk_of_spot(of_a);
-                    own.push((local(at), -factor * x[theta[1]]));
-                    own.push((local(at + 1), factor * (x[theta[0]] + force * bulk.by_place[1][(2, 2)])));
+                    let by_x = -factor * x[theta[1]];
+                    let by_y = factor * (x[theta[0]] + force * bulk.by_place[1][(2, 2)]);
+                    for at in cell
+                        .lasers
+                        .map_or([None, Some(SPOTS + laser)], |aim| [Some(cell.point), Some(aim + laser)])
+                    {
+                        own.extend(at.map(|at| (local(at), by_x)));
+                        own.extend(at.map(|at| (local(at + 1), by_y)));
+                    }
                     if assembled {
                         let by = bulk.by.iter();
                         own.extend(by.map(|(at, by)| (local(*at), factor * force * by[(2, 2)])));

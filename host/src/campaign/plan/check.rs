@@ -245,6 +245,18 @@ impl Plan {
             );
         }
         self.check_own_channels(faults);
+        for point in self.geometry.response.iter().filter(|point| point.get_ref().lasers) {
+            let (at, own) = (point.span().start, point.get_ref());
+            faults.unless(
+                own.grouping == 2 && own.channels.is_none(),
+                at,
+                format!(
+                    "geometry: lasers of `{}`: LDV_A and LDV_B are compared with the 3-D vibrometer on arm B, \
+                     at a point of grouping 2 without channels of its own",
+                    own.name
+                ),
+            );
+        }
         for point in &self.geometry.impact {
             let [x, y, z] = point.get_ref().direction;
             faults.unless(

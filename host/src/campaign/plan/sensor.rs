@@ -398,6 +398,10 @@ pub struct ResponsePoint {
     pub channels: Option<Vec<String>>,
     /// Mass of the fixed sensor, g.
     pub mass_g: Option<f64>,
+    /// Whether `LDV_A` and `LDV_B` are aimed at this point too while B alone is measured, which
+    /// compares their gains with the 3-D vibrometer's. In the assembly they stay on their spots.
+    #[serde(default)]
+    pub lasers: bool,
 }
 
 impl ResponsePoint {

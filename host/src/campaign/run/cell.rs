@@ -294,7 +294,11 @@ impl Runner<'_> {
             let [x, y, z] = point.direction;
             format!(" ({}; pushing along {x} {y} {z})", millimetres(point.position_m))
         });
-        let laser = response.map_or(String::new(), |point| format!(" ({})", millimetres(point.position_m)));
+        let laser = response.map_or(String::new(), |point| {
+            let all = point.lasers && configuration_name(cell.configuration) == "B";
+            let others = if all { "; LDV_A and LDV_B too" } else { "" };
+            format!(" ({}{others})", millimetres(point.position_m))
+        });
         let place = 1 + self.cells.iter().position(|other| other.id == row.id).unwrap_or(0);
         format!(
             "cell {place} of {}, structure {}: {} of {} good\n  hammer to {}{hammer}\n  laser to {}{laser}",
