@@ -325,6 +325,20 @@ pub fn mac(a: &[C], b: &[C]) -> f64 {
     if both > 0.0 { (product.norm_sqr() / both).min(1.0) } else { 0.0 }
 }
 
+/// Modal phase collinearity of a shape: 1 if all components move in phase or in opposite phase
+/// (a real shape times any complex factor), 0 for a travelling wave; 1 also for one component, and
+/// for none that moves.
+pub fn phase_collinearity(shape: &[C]) -> f64 {
+    let (mut re_re, mut re_im, mut im_im) = (0.0, 0.0, 0.0);
+    for v in shape {
+        re_re += v.re * v.re;
+        re_im += v.re * v.im;
+        im_im += v.im * v.im;
+    }
+    let all: f64 = re_re + im_im;
+    if all > 0.0 { (((re_re - im_im).powi(2) + 4.0 * re_im * re_im) / (all * all)).min(1.0) } else { 1.0 }
+}
+
 /// Why modes are not identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
