@@ -72,9 +72,10 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<NodalData, Wrong> {
     if !TYPES.contains(&of_type) {
         return Err(first.wrong(format!("values of the type {of_type}: 2 (real) and 5 (complex) are read")));
     }
-    let per_node = usize::try_from(per_node).ok().filter(|n| *n > 0).ok_or_else(|| {
-        first.wrong(format!("{per_node} values at each node: at least 1 is expected"))
-    })?;
+    let per_node = usize::try_from(per_node)
+        .ok()
+        .filter(|n| *n > 0)
+        .ok_or_else(|| first.wrong(format!("{per_node} values at each node: at least 1 is expected")))?;
     let mut words = Words::new(lines);
     let mut count = |what: &str| -> Result<usize, Wrong> {
         let n = words.integer(what)?;
@@ -100,9 +101,13 @@ pub(super) fn read(mut lines: Lines<'_>) -> Result<NodalData, Wrong> {
 pub(super) fn write(data: &NodalData, out: &mut Output) -> Result<(), String> {
     let NodalData { id, model, analysis, characteristic, quantity, is_complex, nodes, .. } = data;
     let per_node = nodes.first().map_or(1, |(_, values)| values.len());
-    if let Some((label, values)) = nodes.iter().find(|(_, values)| values.len() != per_node || values.is_empty())
+    if let Some((label, values)) =
+        nodes.iter().find(|(_, values)| values.len() != per_node || values.is_empty())
     {
-        return Err(format!("node {label} has {} values: each must have the same number, at least 1", values.len()));
+        return Err(format!(
+            "node {label} has {} values: each must have the same number, at least 1",
+            values.len()
+        ));
     }
     out.open(55, "");
     for text in id {
@@ -181,11 +186,15 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused_with_its_reason() {
-        let wrong = |from: &str, to: &str| read(FOREIGN.replacen(from, to, 1).as_bytes()).faults[0].reason.clone();
+        let wrong =
+            |from: &str, to: &str| read(FOREIGN.replacen(from, to, 1).as_bytes()).faults[0].reason.clone();
         assert!(wrong("         5         3\n", "         4         3\n").contains("type 4"));
         assert!(wrong("         5         3\n", "         5        -3\n").contains("-3 values"));
         assert!(wrong("         2         6 ", "         2        -6 ").contains("count of real"));
-        assert!(wrong("  2.00000e-02  0.00000e+00  0.00000e+00  0.00000e+00  0.00000e+00\n", "\n").contains("missing"));
+        assert!(
+            wrong("  2.00000e-02  0.00000e+00  0.00000e+00  0.00000e+00  0.00000e+00\n", "\n")
+                .contains("missing")
+        );
         let uneven = read(FOREIGN.as_bytes()).sets.into_iter().map(|set| match set {
             DataSet::NodalData(mut mode) => {
                 mode.nodes[1].1.pop();

@@ -46,6 +46,7 @@
 
 mod data;
 mod evidence;
+mod follow;
 mod likelihood;
 mod plscf;
 #[cfg(test)]
@@ -54,6 +55,7 @@ mod random_rigs;
 mod tests;
 mod uncertainty;
 
+pub use follow::{Followed, follow};
 pub use plscf::{STABLE_DAMPING, STABLE_FREQUENCY, STABLE_MAC};
 
 use crate::C;

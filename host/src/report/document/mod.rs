@@ -11,9 +11,11 @@ use crate::substructuring::cmif::Cmif;
 use serde_json::{Map, json};
 
 pub use compared_from_results::compare;
+pub use from_modes::{mode_rows, scaling};
 
 mod compared_from_results;
 mod from_findings;
+mod from_modes;
 
 /// Builds `results.json` from all findings.
 pub fn document(found: Findings) -> Results {
@@ -23,6 +25,7 @@ pub fn document(found: Findings) -> Results {
     let answer = from_findings::answer(&found);
     let (joint, refused) = from_findings::joint_rows(&found);
     let hysteresis = from_findings::loop_rows(&found);
+    let (modes, modal) = mode_rows(&found.modes);
     let mut results = Results {
         version: VERSION,
         source,
@@ -30,6 +33,8 @@ pub fn document(found: Findings) -> Results {
         joint,
         recommended: found.recommended,
         bootstrap: found.bootstrap,
+        modes,
+        modal,
         hysteresis,
         checks,
         refused,

@@ -1,0 +1,73 @@
+//! Modes in plain sentences.
+
+use super::number::{band, decimals, to_its_interval};
+use crate::analyse::FoundModes;
+use crate::modes::NoiseKnown;
+use crate::results::{ModalFit, ModeRow};
+
+/// χ² per degree of freedom above which the model does not explain the FRFs within their noise.
+const MISFIT: f64 = 1.3;
+
+/// What limits the use of these modes.
+pub fn warnings(found: &FoundModes) -> Vec<String> {
+    let modes = &found.modes;
+    let mut told = Vec::new();
+    if let Some(why) = &found.without_variance {
+        told.push(format!(
+            "{why}: all variances are ignored, the noise is estimated from what the modes leave of the FRFs."
+        ));
+    } else if modes.noise == NoiseKnown::Estimated {
+        told.push(
+            "The FRFs have no variance: the noise is estimated from what the modes leave of them, so nothing tells whether the modes explain the FRFs."
+                .into(),
+        );
+    } else if modes.chi2_per_dof > MISFIT {
+        told.push(format!(
+            "χ² per degree of freedom is {}: the FRFs differ from those of any linear structure by more than their noise. All intervals are widened by its root, and modes may be listed that describe this difference.",
+            decimals(modes.chi2_per_dof, 2)
+        ));
+    }
+    if !found.left_out.is_empty() {
+        told.push(format!(
+            "Not used, because some of their FRFs are missing: {}.",
+            found.left_out.join(", ")
+        ));
+    }
+    told
+}
+
+/// The modes of one structure as lines of a table for the terminal.
+pub fn table(fit: &ModalFit, modes: &[ModeRow]) -> Vec<String> {
+    let own: Vec<&ModeRow> = modes.iter().filter(|mode| mode.structure == fit.structure).collect();
+    let mut lines = vec![heading(fit, own.len())];
+    if !own.is_empty() {
+        lines.push("  frequency, Hz          damping, %             collinearity  moves most     (± half the 95 % interval)".into());
+    }
+    for mode in own {
+        let [frequency, damping] = values(mode);
+        lines.push(format!(
+            "  {frequency:<22} {damping:<22} {:<13} {}",
+            decimals(mode.phase_collinearity, 3),
+            mode.largest
+        ));
+    }
+    lines.extend(fit.warnings.iter().map(|warning| format!("  {warning}")));
+    lines
+}
+
+/// Number of modes, band and χ² of one structure.
+pub fn heading(fit: &ModalFit, modes: usize) -> String {
+    let structure = fit.structure.as_ref().map_or(String::new(), |structure| format!("{structure}: "));
+    let fits = fit
+        .chi2_per_dof
+        .map_or(String::new(), |chi2| format!(", χ² per degree of freedom {}", decimals(chi2, 2)));
+    let plural = if modes == 1 { "mode" } else { "modes" };
+    format!("{structure}{modes} {plural} in {}{fits}", band(fit.band_hz))
+}
+
+/// Frequency in Hz and damping in %, each with half its 95 % interval.
+pub fn values(mode: &ModeRow) -> [String; 2] {
+    [(&mode.frequency_hz, 1.0), (&mode.damping_ratio, 100.0)].map(|(value, scale)| {
+        to_its_interval(scale * value.mean, scale * 0.5 * (value.ci95[1] - value.ci95[0]))
+    })
+}
