@@ -10,7 +10,7 @@ use super::findings::{Findings, Settings};
 use super::from_frfs::{Fit, NoFit, Substructured, fits, recommended};
 use super::missing::{Missing, given_up};
 use super::modal::{FoundModes, MODES_HZ};
-use super::{cells_stage, chosen, configuration_stage, contact_answer, contact_stage};
+use super::{cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -140,6 +140,9 @@ pub fn analyse_measurements<M: Measurements>(
         contact: Some(contact),
         own_stiffness: Some(own_stiffness),
         between_arms: Some(between_arms),
+        first_mode: first_mode::first_mode(&modes, &cells.at_contact, |record| {
+            measurements.session_of(record)
+        }),
         modes,
         missing,
         ..Findings::default()

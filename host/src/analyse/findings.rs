@@ -12,7 +12,7 @@ use super::modal::FoundModes;
 use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
 use crate::results::{
-    Bootstrap, Cells, Completeness, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
+    Bootstrap, Cells, Completeness, FirstMode, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
 };
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -61,6 +61,8 @@ pub struct Findings {
     pub between_arms: Option<Result<BetweenArms, NoStiffness>>,
     /// The modes of each structure.
     pub modes: Vec<FoundModes>,
+    /// The assembly's first mode in every hit.
+    pub first_mode: Option<FirstMode>,
     /// The loops of a single record.
     pub record: Option<RecordLoops>,
     /// Missing data, in the order in which they were noticed.

@@ -449,6 +449,11 @@ impl Measurements for CampaignFile {
         self.cells.iter().map(|c| c.name.clone()).collect()
     }
 
+    fn session_of(&self, record: i64) -> Option<i64> {
+        let rows = self.records.values().flatten().flatten();
+        rows.filter(|row| row.id == record).map(|row| row.session).next()
+    }
+
     fn given_up(&self) -> Vec<(CellName, String)> {
         self.cells.iter().filter_map(|c| Some((c.name.clone(), c.given_up.clone()?))).collect()
     }

@@ -23,6 +23,7 @@ mod contact_stage;
 #[cfg(feature = "sim")]
 pub mod expected;
 mod findings;
+mod first_mode;
 mod from_frfs;
 mod from_store;
 mod impact_loops;

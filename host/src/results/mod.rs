@@ -26,7 +26,10 @@ pub use joint::{
 };
 pub use loops::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, Reconstruction, ShakerLoop};
 pub use measured::{CellRow, Cells, FrfCurve, HitRow, NoiseFloor, Place, Role, UsableBand};
-pub use modal::{ChartPoles, ModalFit, ModeRow, Moving, OutputPoint, PoleOnly, SensorPlace};
+pub use modal::{
+    ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, OutputPoint, PoleOnly, SensorPlace,
+    SessionFrequency,
+};
 
 #[cfg(test)]
 pub(crate) mod example_tests;
@@ -76,6 +79,9 @@ pub struct Results {
     /// How the modes of each structure were identified, with its stabilisation chart.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modal: Vec<ModalFit>,
+    /// The assembly's first mode in every hit of a campaign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_mode: Option<FirstMode>,
     /// The contact by loops.
     pub hysteresis: Vec<Hysteresis>,
     /// Whether the numbers are credible.

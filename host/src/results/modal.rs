@@ -118,3 +118,50 @@ pub struct ChartPoles {
     /// Their natural frequencies, Hz.
     pub frequency_hz: Vec<f64>,
 }
+
+/// The lowest mode of the assembly that the hits show, hit by hit: whether it changed over the
+/// campaign.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FirstMode {
+    /// The mode's natural frequency from all FRFs, Hz.
+    pub mode_hz: f64,
+    /// Hits that were tried; those without enough signal are not listed.
+    pub hits_tried: usize,
+    /// Change of its frequency from the first hit to the last, Hz; null with too few cells.
+    pub change_hz: Option<Interval>,
+    /// Whether it changed; null if that is not clear.
+    pub drifts: Option<bool>,
+    /// Each session.
+    pub sessions: Vec<SessionFrequency>,
+    /// Each hit, in the order of the records.
+    pub hits: Vec<HitFrequency>,
+}
+
+/// Frequency of a mode in one session; differences between places of impact are removed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SessionFrequency {
+    /// The session.
+    pub session: i64,
+    /// Number of its hits.
+    pub hits: usize,
+    /// Mean frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its 95 % interval from the scatter of the hits; null for a single hit.
+    pub ci95: Option<[f64; 2]>,
+}
+
+/// Frequency of a mode in one hit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HitFrequency {
+    /// The record.
+    pub record: i64,
+    /// Its session.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub session: Option<i64>,
+    /// The place of impact.
+    pub impact: String,
+    /// Natural frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its 95 % interval, from what the fit leaves of this hit.
+    pub ci95: [f64; 2],
+}

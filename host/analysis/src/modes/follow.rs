@@ -1,8 +1,9 @@
 //! One mode in a few lines of one column, such as those of a single hit: whether its frequency is
 //! the same from hit to hit.
 //!
-//! The values of each output are R/(s − λ) with the pole λ common to all, the peaks of neighbouring
-//! modes at fixed poles, and a straight line over s. All residues are free, so that errors of aim
+//! The values of each output are R (1 − e^((λ − s)T))/(s − λ), the transform of a free vibration
+//! that is cut off after the time T, with the pole λ common to all; the same of neighbouring modes
+//! at fixed poles; and a straight line over s. All residues are free, so that errors of aim
 //! and direction, which change residues, do not change the frequency. Each output is weighted by
 //! what the fit leaves of it.
 
@@ -27,9 +28,10 @@ pub struct Followed {
     pub frequency_std_hz: f64,
 }
 
-/// The mode near `start` (1/s) in the `outputs`, each with one value per line `s`; `neighbours` are
-/// the poles of other modes in or near these lines. `None` if the lines do not determine it.
-pub fn follow(s: &[C], outputs: &[Vec<C>], start: C, neighbours: &[C]) -> Option<Followed> {
+/// The mode near `start` (1/s) in the `outputs`, each with one value per line `s` of a record that
+/// ends `length_s` after the hit (infinite for one that ends at rest); `neighbours` are the poles of
+/// other modes in or near these lines. `None` if the lines do not determine it.
+pub fn follow(s: &[C], outputs: &[Vec<C>], length_s: f64, start: C, neighbours: &[C]) -> Option<Followed> {
     let unknowns = 3 + neighbours.len();
     // twice as many lines as unknowns, so that what is left of them is an estimate of the noise
     if s.len() < 2 * unknowns || outputs.is_empty() {
@@ -38,13 +40,18 @@ pub fn follow(s: &[C], outputs: &[Vec<C>], start: C, neighbours: &[C]) -> Option
     let freedom = (s.len() - unknowns) as f64;
     let middle = s[s.len() / 2];
     let scale = (s[s.len() - 1] - s[0]).norm();
+    // what is left of the vibration at the end of the record, at the line s
+    let left_at_end = |pole: C, s: C| {
+        if length_s.is_finite() { ((pole - s) * length_s).exp() } else { C::from(0.0) }
+    };
+    let peak = |pole: C, s: C| (1.0 - left_at_end(pole, s)) / (s - pole);
     let mut pole = start;
     for _ in 0..STEPS {
         let basis = DMatrix::from_fn(s.len(), unknowns, |l, k| match k {
-            0 => scale / (s[l] - pole),
+            0 => scale * peak(pole, s[l]),
             1 => C::from(1.0),
             2 => (s[l] - middle) / scale,
-            _ => scale / (s[l] - neighbours[k - 3]),
+            _ => scale * peak(neighbours[k - 3], s[l]),
         });
         let orthogonal = basis.qr();
         let (q, r) = (orthogonal.q(), orthogonal.r());
@@ -54,7 +61,10 @@ pub fn follow(s: &[C], outputs: &[Vec<C>], start: C, neighbours: &[C]) -> Option
             let values = DVector::from_column_slice(values);
             let left = rest(&values);
             let residue = r.solve_upper_triangular(&q.ad_mul(&values))?[0] * scale;
-            let slope = DVector::from_iterator(s.len(), s.iter().map(|s| residue / (s - pole).powi(2)));
+            let slope = s.iter().map(|s| {
+                residue * (peak(pole, *s) - length_s_times(left_at_end(pole, *s), length_s)) / (s - pole)
+            });
+            let slope = DVector::from_iterator(values.len(), slope);
             let slope = rest(&slope);
             // variance of the real part
             let variance = left.norm_squared() / (2.0 * freedom);
@@ -85,12 +95,19 @@ pub fn follow(s: &[C], outputs: &[Vec<C>], start: C, neighbours: &[C]) -> Option
     None
 }
 
+/// Zero at the end of a record without end, where the vibration is zero.
+fn length_s_times(left: C, length_s: f64) -> C {
+    if left == C::from(0.0) { left } else { left * length_s }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
+
+    const LENGTH_S: f64 = 0.3;
 
     /// Lines of 3 Hz with a window of 8 1/s, two outputs, a mode at `frequency_hz` beside one at
     /// 220 Hz.
@@ -99,10 +116,11 @@ mod tests {
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let pole = |f: f64| TAU * f * C::new(-0.01, 0.99995);
         let (own, other) = (pole(frequency_hz), pole(220.0));
+        let cut = |s: C, pole: C| (1.0 - ((pole - s) * LENGTH_S).exp()) / (s - pole);
         let s: Vec<C> = (50..84).map(|l| C::new(8.0, TAU * 3.0 * f64::from(l))).collect();
         let outputs = [C::new(1.0, 0.1), C::new(-0.4, 0.3)].map(|residue| {
             let value = |s: &C| {
-                residue / (s - own) + 0.5 / (s - other) + s * 1e-6 + noise * C::new(normal(), normal())
+                residue * cut(*s, own) + 0.5 * cut(*s, other) + s * 1e-6 + noise * C::new(normal(), normal())
             };
             s.iter().map(value).collect()
         });
@@ -112,12 +130,12 @@ mod tests {
     #[test]
     fn a_frequency_is_found_with_its_standard_deviation() {
         let (s, outputs, start, other) = hit(191.0, 0.0, 0);
-        let found = follow(&s, &outputs, start, &[other]).expect("a mode");
+        let found = follow(&s, &outputs, LENGTH_S, start, &[other]).expect("a mode");
         assert!((found.frequency_hz - 191.0).abs() < 1e-6, "{found:?}");
         let mut squares = 0.0;
         for seed in 0..400 {
             let (s, outputs, start, other) = hit(191.0, 1e-3, seed);
-            let found = follow(&s, &outputs, start, &[other]).expect("a mode");
+            let found = follow(&s, &outputs, LENGTH_S, start, &[other]).expect("a mode");
             squares += ((found.frequency_hz - 191.0) / found.frequency_std_hz).powi(2);
         }
         let rms = f64::sqrt(squares / 400.0);
@@ -127,9 +145,9 @@ mod tests {
     #[test]
     fn noise_alone_and_too_few_lines_give_nothing_certain() {
         let (s, outputs, start, other) = hit(191.0, 0.0, 0);
-        assert_eq!(follow(&s[..7], &[outputs[0][..7].to_vec()], start, &[other]), None);
+        assert_eq!(follow(&s[..7], &[outputs[0][..7].to_vec()], LENGTH_S, start, &[other]), None);
         let (s, outputs, start, other) = hit(191.0, 10.0, 3);
-        let found = follow(&s, &outputs, start, &[other]);
+        let found = follow(&s, &outputs, LENGTH_S, start, &[other]);
         assert!(found.is_none_or(|found| found.frequency_std_hz > 0.5), "{found:?}");
     }
 }

@@ -35,6 +35,7 @@ pub fn document(found: Findings) -> Results {
         bootstrap: found.bootstrap,
         modes,
         modal,
+        first_mode: found.first_mode,
         hysteresis,
         checks,
         refused,

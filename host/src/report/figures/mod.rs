@@ -108,6 +108,7 @@ pub const ALL: &[Entry] = &[
     ),
     entry(Chapter::Modes, "Stabilisation chart", "FRFs of several lines", modes::stabilisation),
     entry(Chapter::Modes, "Shapes of the modes", "modes at points whose positions are known", modes::shapes),
+    entry(Chapter::Modes, "The first mode over the campaign", IMPACTS, modes::first_mode),
     entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
     entry(
         Chapter::Frfs,

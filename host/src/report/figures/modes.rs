@@ -2,8 +2,10 @@
 //! where they were measured.
 
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Scene, Shape, Spot, Spread};
-use crate::report::words::mode_sentences::values;
-use crate::results::{ModalFit, ModeRow, Results};
+use crate::report::scale::middle_range;
+use crate::report::words::mode_sentences::{first_mode_sentence, values};
+use crate::report::words::number::decimals;
+use crate::results::{HitFrequency, ModalFit, ModeRow, Results};
 use num_complex::Complex;
 
 /// Modes whose shapes are drawn, at most: the lowest of the structure.
@@ -30,7 +32,10 @@ pub fn stabilisation(results: &Results) -> Option<Figure> {
         "Poles of rising model orders. Vertical lines are the modes listed in the table; they are fitted to the FRFs by maximum likelihood and not picked from this chart, whose damping is biased by noise.",
     );
     for (at, fit) in charts {
-        figure = figure.with(chart(at, fit, &results.modes));
+        let panel = chart(at, fit, &results.modes);
+        // the names are the same in all panels
+        let panel = if figure.panels.is_empty() { panel } else { panel.named_above() };
+        figure = figure.with(panel);
     }
     (!figure.panels.is_empty()).then_some(figure)
 }
@@ -124,4 +129,34 @@ fn spots(results: &Results, fit: &ModalFit, mode: &ModeRow) -> Vec<Spot> {
         moves: Some(moved(&sensor.name).map(|v| scale * v)),
     };
     fit.sensors.iter().map(spot).collect()
+}
+
+/// The lowest mode of the assembly in every hit, over the campaign.
+pub fn first_mode(results: &Results) -> Option<Figure> {
+    let found = results.first_mode.as_ref().filter(|found| found.hits.len() > 1)?;
+    let range = middle_range(found.hits.iter().map(|hit| hit.frequency_hz), 1.0, 0.25)?;
+    let records = found.hits.iter().map(|hit| hit.record as f64);
+    let first = records.clone().fold(f64::INFINITY, f64::min);
+    let last = records.fold(f64::NEG_INFINITY, f64::max);
+    let room = 0.02 * (last - first).max(1.0);
+    let x = Axis::linear("record, in the order of the hits", "", [first - room, last + room]);
+    let y = Axis::linear("natural frequency", "Hz", range);
+    let points = found.hits.iter().map(|hit| [hit.record as f64, hit.frequency_hz]);
+    let says = |hit: &HitFrequency| {
+        format!("record {}, impact {}: {} Hz", hit.record, hit.impact, decimals(hit.frequency_hz, 3))
+    };
+    let mark = Mark::points(Role::Measured, Marker::Dot, points)
+        .barred("y", found.hits.iter().map(|hit| hit.ci95))
+        .saying(found.hits.iter().map(says).collect())
+        .from("x", "/first_mode/hits/*/record", 1.0)
+        .from("y", "/first_mode/hits/*/frequency_hz", 1.0)
+        .from("low", "/first_mode/hits/*/ci95/0", 1.0)
+        .from("high", "/first_mode/hits/*/ci95/1", 1.0);
+    let figure = Figure::new(
+        "first-mode",
+        "",
+        "The first mode over the campaign",
+        format!("{} Bars are each hit's own 95 % interval.", first_mode_sentence(found)),
+    );
+    Some(figure.with(Panel::new(x, y).with(mark)))
 }

@@ -1,9 +1,9 @@
 //! Modes in plain sentences.
 
-use super::number::{band, decimals, to_its_interval};
+use super::number::{band, decimals, interval_places, to_its_interval};
 use crate::analyse::FoundModes;
 use crate::modes::NoiseKnown;
-use crate::results::{ModalFit, ModeRow};
+use crate::results::{FirstMode, ModalFit, ModeRow};
 
 /// χ² per degree of freedom above which the model does not explain the FRFs within their noise.
 const MISFIT: f64 = 1.3;
@@ -70,4 +70,26 @@ pub fn values(mode: &ModeRow) -> [String; 2] {
     [(&mode.frequency_hz, 1.0), (&mode.damping_ratio, 100.0)].map(|(value, scale)| {
         to_its_interval(scale * value.mean, scale * 0.5 * (value.ci95[1] - value.ci95[0]))
     })
+}
+
+/// Whether the first mode changed over the campaign.
+pub fn first_mode_sentence(found: &FirstMode) -> String {
+    let (hits, tried) = (found.hits.len(), found.hits_tried);
+    let mode = format!(
+        "The mode at {} Hz, the lowest of the assembly that most hits show ({hits} of {tried}),",
+        decimals(found.mode_hz, 1)
+    );
+    let change = found.change_hz.as_ref().map(|change| {
+        let places = interval_places(0.5 * (change.ci95[1] - change.ci95[0]));
+        let [mean, low, high] = [change.mean, change.ci95[0], change.ci95[1]].map(|v| decimals(v, places));
+        format!("{mean} Hz from the first hit to the last (95 % {low}…{high})")
+    });
+    match (found.drifts, change) {
+        (Some(true), Some(change)) => {
+            format!("{mode} changed by {change}: contact or clamps were not the same in all hits.")
+        }
+        (Some(false), Some(change)) => format!("{mode} did not change: {change}."),
+        (_, Some(change)) => format!("{mode} changed by {change}, which decides nothing."),
+        (_, None) => format!("{mode} was seen in too few cells to tell a change."),
+    }
 }
