@@ -103,6 +103,7 @@ fn summary(
             ci95: [-1.0, 1.0].map(|sign| change.change_hz + sign * NORMAL_95 * change.std_hz),
         }),
         drifts,
+        meaning: String::new(),
         hits: rows,
     }
 }
@@ -131,7 +132,7 @@ fn sessions(
         let scatter = values.iter().map(|v| (v - centre).powi(2)).sum::<f64>();
         let half = NORMAL_95 * (scatter / ((n - 1.0).max(1.0) * n)).sqrt();
         // the scatter of a single hit is not known
-        let ci95 = (values.len() > 1).then(|| [centre - half, centre + half]);
+        let ci95 = (values.len() > 1).then_some([centre - half, centre + half]);
         SessionFrequency { session, hits: values.len(), frequency_hz: centre, ci95 }
     };
     of_session.into_iter().map(one).collect()
@@ -183,5 +184,63 @@ impl Change {
         } else {
             (self.change_hz.abs() + 2.0 * self.std_hz < 5.0 * concern).then_some(false)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analyse::CellName;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    /// Three places of impact with six cells of three hits, whose frequency rises by `change_hz`
+    /// from the first to the last and scatters from cell to cell by 0.1 Hz.
+    fn change(seed: u64, change_hz: f64) -> Change {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+        let mut hits = Vec::new();
+        for cell in 0..18 {
+            let of_cell = 0.1 * normal() + f64::from(cell / 6);
+            for hit in 0..3 {
+                let record = i64::from(3 * cell + hit);
+                let frequency_hz = 200.0 + of_cell + change_hz * record as f64 / 53.0 + 0.01 * normal();
+                let response = HitResponse {
+                    impulse_n_s: 0.01,
+                    peak_n: 50.0,
+                    peak_tangential_n: 10.0,
+                    first_hz: 60.0,
+                    step_hz: 3.0,
+                    per_newton: Default::default(),
+                };
+                let cell = CellName {
+                    configuration: Structure::Ajb,
+                    impact: format!("Z{}", cell / 6),
+                    response: format!("A{cell}"),
+                };
+                let pole_per_s = Complex::new(-1.0, TAU * frequency_hz);
+                let followed = Followed { pole_per_s, frequency_hz, frequency_std_hz: 0.01 };
+                hits.push((HitAtContact { cell, record, response }, followed));
+            }
+        }
+        let found: Vec<_> = hits.iter().map(|(hit, followed)| (hit, *followed)).collect();
+        Change::of(&found).expect("enough cells")
+    }
+
+    #[test]
+    fn a_change_is_found_with_its_size_and_none_without() {
+        let (mut claimed, mut squares) = (0, 0.0);
+        for seed in 0..300 {
+            let none = change(seed, 0.0);
+            squares += (none.change_hz / none.std_hz).powi(2);
+            claimed += u32::from(none.certain(200.0) == Some(true));
+            let some = change(1000 + seed, 4.0);
+            assert_eq!(some.certain(200.0), Some(true), "{some:?}");
+            assert!((some.change_hz - 4.0).abs() < 6.0 * some.std_hz, "{some:?}");
+        }
+        assert!(claimed <= 2, "{claimed} of 300 steady campaigns");
+        let rms = f64::sqrt(squares / 300.0);
+        assert!((0.9..1.25).contains(&rms), "{rms}");
     }
 }

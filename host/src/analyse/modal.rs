@@ -14,8 +14,7 @@ use super::assemble;
 use crate::exchange::LabelledFrf;
 use crate::exchange::labelled_frf::Label;
 use crate::frf::{Frf, FrfError};
-use crate::modes::{self, DrivingPoint, Modes, ModesError, Settings};
-use crate::results::OutputPoint;
+use crate::modes::{self, DrivingPoint, Modes, ModesError, OutputPoint, Settings};
 use crate::structure::Structure;
 use crate::substructuring::Band;
 use crate::substructuring::geometry::{Configuration, Point};
@@ -311,5 +310,85 @@ pub fn labelled_point(read: &LabelledFrf, output: &str) -> OutputPoint {
             OutputPoint { name: name.into(), position_m: None, direction: Some(axis(a)) }
         }
         (None, None) => OutputPoint { name: output.into(), position_m: None, direction: None },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frf::MotionQuantity;
+    use crate::substructuring::geometry::Grouping;
+
+    const BAND: Band = Band { low_hz: 10.0, high_hz: 20.0 };
+
+    /// Two channels on an arm and one on a specimen; impacts along z (two), y and x.
+    fn points() -> Configuration {
+        let point = |name: &str, description: &str, grouping, direction| Point {
+            name: name.into(),
+            description: description.into(),
+            grouping,
+            position_m: [0.01, 0.0, 0.0],
+            direction,
+        };
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let impact = |name: &str, direction| point(name, name, Grouping::InterfaceA, direction);
+        Configuration {
+            channels: vec![
+                point("A1", "A1:z", Grouping::InterfaceA, z),
+                point("A1", "A1:x", Grouping::InterfaceA, x),
+                point("S1", "S1:z", Grouping::SpecimenA, z),
+            ],
+            impacts: vec![impact("Z1", [0.0, 0.0, -1.0]), impact("Z2", z), impact("Y1", y), impact("X1", x)],
+        }
+    }
+
+    /// Lines of 0.5 Hz, all values one; the variance of `Z2` is a tenth of the others'.
+    fn frf() -> Frf {
+        let points = points();
+        let frequency_hz: Vec<f64> = (20..=40).map(|k| 0.5 * f64::from(k)).collect();
+        let lines = vec![DMatrix::from_element(3, 4, Complex::from(1.0)); frequency_hz.len()];
+        let variance = DMatrix::from_fn(3, 4, |_, i| if i == 1 { 1e-5 } else { 1e-4 });
+        let variance = vec![variance; lines.len()];
+        let (outputs, inputs) = (points.output_names(), points.input_names());
+        let whole = Frf::new(frequency_hz, 2.3, MotionQuantity::Velocity, outputs, inputs, lines);
+        whole.expect("all agree").with_variance(variance).expect("all agree")
+    }
+
+    #[test]
+    fn of_each_axis_the_clearest_impact_is_used_and_no_specimen() {
+        let few = few_columns(&frf(), &points(), BAND).expect("columns");
+        assert_eq!(few.inputs(), ["X1", "Y1", "Z2"]);
+        assert_eq!(few.outputs().len(), 2);
+        // a column with a gap is not as clear as a complete one
+        let holed = frf().map_lines(|_, mut y| y[(0, 1)] = Complex::new(f64::NAN, 0.0));
+        let few = few_columns(&holed, &points(), BAND).expect("columns");
+        assert_eq!(few.inputs(), ["X1", "Y1", "Z1"]);
+    }
+
+    #[test]
+    fn lines_are_one_hertz_apart_and_keep_their_variance() {
+        let few = few_lines(&frf()).expect("lines");
+        assert_eq!(few.frequency_hz(), [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0]);
+        assert_eq!(few.variance().map(<[_]>::len), Some(11));
+    }
+
+    #[test]
+    fn the_error_adds_to_the_variance_and_gaps_leave_out_what_they_belong_to() {
+        let enlarged = with_error(frf(), 0.1).expect("variances");
+        let variance = enlarged.variance().expect("there")[0][(0, 0)];
+        assert!((variance - (1e-4 + 0.01)).abs() < 1e-12, "{variance}");
+        let holed = frf().map_lines(|_, mut y| y[(0, 1)] = Complex::new(f64::NAN, 0.0));
+        let (kept, left_out) = without_gaps(&holed, BAND).expect("some are whole");
+        assert!(kept.check_finite().is_ok() && left_out.len() == 1, "{left_out:?}");
+        let none = frf().map_lines(|_, mut y| y.fill(Complex::new(f64::NAN, 0.0)));
+        assert_eq!(without_gaps(&none, BAND), Err(NoModes::NoWholeCell(BAND)));
+    }
+
+    #[test]
+    fn an_impact_at_a_channel_along_its_line_is_a_driving_point() {
+        let all = driving_points(&frf(), &points());
+        let of_a1 = |at: &&DrivingPoint| at.output == 0;
+        let signs: Vec<f64> = all.iter().filter(of_a1).map(|at| at.sign).collect();
+        assert_eq!(signs, [-1.0, 1.0]);
     }
 }

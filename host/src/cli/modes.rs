@@ -102,7 +102,7 @@ impl ModesArgs {
             };
             match frf {
                 Some(frf) => {
-                    found.push(campaign.modes(*structure, &frf, band).map_err(|error| wrong(&error))?)
+                    found.push(campaign.modes(*structure, &frf, band).map_err(|error| wrong(&error))?);
                 }
                 None if self.structures.is_empty() => {}
                 None => return Err(wrong(&"no good hit and no imported FRFs: measure it, or leave it out")),

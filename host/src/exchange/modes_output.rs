@@ -5,8 +5,7 @@ use super::frf_uff::{FrfUffError, write_uff};
 use super::npz::{NpzError, NpzOutput};
 use super::uff::{DataSet, NodalData, Node};
 use super::uff_output::start;
-use crate::modes::{Mode, Modes, NoiseKnown, Scaling};
-use crate::results::OutputPoint;
+use crate::modes::{Mode, Modes, NoiseKnown, OutputPoint, Scaling};
 use num_complex::Complex;
 use std::path::Path;
 
@@ -45,8 +44,7 @@ pub fn write_npz(path: &Path, modes: &Modes, points: &[OutputPoint], scaling: &s
     let noise = if modes.noise == NoiseKnown::Given { "given" } else { "estimated" };
     out.text("noise", &[], &[noise.into()])?;
     out.real("chi2_per_dof", &[], [modes.chi2_per_dof])?;
-    type Known = fn(&OutputPoint) -> Option<[f64; 3]>;
-    let known: [(&str, Known); 2] =
+    let known: [(&str, fn(&OutputPoint) -> Option<[f64; 3]>); 2] =
         [("output_position", |p| p.position_m), ("output_direction", |p| p.direction)];
     for (name, of) in known {
         if let Some(all) = points.iter().map(of).collect::<Option<Vec<_>>>() {

@@ -27,8 +27,7 @@ pub use joint::{
 pub use loops::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, Reconstruction, ShakerLoop};
 pub use measured::{CellRow, Cells, FrfCurve, HitRow, NoiseFloor, Place, Role, UsableBand};
 pub use modal::{
-    ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, OutputPoint, PoleOnly, SensorPlace,
-    SessionFrequency,
+    ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, PoleOnly, SensorPlace, SessionFrequency,
 };
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The modes of the structures, and how they were identified.
 
 use crate::contact::Interval;
+use crate::modes::OutputPoint;
 use crate::substructuring::Band;
 use serde::Serialize;
 
@@ -78,17 +79,6 @@ pub struct ModalFit {
     pub chart: Vec<ChartPoles>,
 }
 
-/// An output: its sensor, place and direction.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OutputPoint {
-    /// The sensor's name.
-    pub name: String,
-    /// Its position, m; null if it is not known.
-    pub position_m: Option<[f64; 3]>,
-    /// Unit vector of its positive direction; null if it is not known.
-    pub direction: Option<[f64; 3]>,
-}
-
 /// Frequency and damping of a pole that is not a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoleOnly {
@@ -131,6 +121,8 @@ pub struct FirstMode {
     pub change_hz: Option<Interval>,
     /// Whether it changed; null if that is not clear.
     pub drifts: Option<bool>,
+    /// What this means, in a sentence.
+    pub meaning: String,
     /// Each session.
     pub sessions: Vec<SessionFrequency>,
     /// Each hit, in the order of the records.

@@ -166,3 +166,36 @@ fn a_campaign_has_modes_in_command_results_and_report() {
         assert!(page.contains(figure), "{figure}");
     }
 }
+
+/// The first mode of a short campaign on the assembly alone; the contact's stiffness rises by
+/// `drift_per_hit` with each hit.
+fn first_mode(drift_per_hit: f64) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let elastic = include_str!("../../../hil-sim/rigs/elastic.toml");
+    let rig = format!("{elastic}\n[contact]\ndrift_per_hit = {drift_per_hit:?}\n");
+    std::fs::write(at("rig.toml"), rig).unwrap();
+    let responses = ["A1", "A2", "A3", "A4", "B1", "B2", "B3", "B4"];
+    let cells = jointrig_tests::campaign::plan(2, &[("AJB", &["AZ1", "AY1", "AX1"], &responses)]);
+    std::fs::write(at("plan.toml"), cells).unwrap();
+    done(jointrig().args(["campaign", "new"]).arg(at("lab.jrig")).arg("--plan").arg(at("plan.toml")));
+    let address = format!("sim:{}", at("rig.toml").display());
+    done(jointrig().args(["campaign", "run", "--yes", "--device", &address]).arg(at("lab.jrig")));
+    // no stiffness follows from the assembly alone, which ends the command with 1
+    jointrig().arg("analyse").arg(at("lab.jrig")).arg("--out").arg(at("out")).output().unwrap();
+    let results: Value = serde_json::from_slice(&std::fs::read(at("out/results.json")).unwrap()).unwrap();
+    results["first_mode"].clone()
+}
+
+#[test]
+fn a_contact_that_drifts_changes_the_first_mode_and_a_steady_one_does_not() {
+    let drifting = first_mode(5e-3);
+    assert_eq!(drifting["drifts"], true, "{}", drifting["meaning"]);
+    assert!(number(&drifting["change_hz"]["ci95"][0]) > 0.0, "{}", drifting["meaning"]);
+    assert!(drifting["hits"].as_array().unwrap().len() >= 8);
+    assert!(drifting["meaning"].as_str().unwrap().contains("not the same in all hits"));
+    let steady = first_mode(0.0);
+    assert_ne!(steady["drifts"], true, "{}", steady["meaning"]);
+    let [low, high] = [0, 1].map(|end| number(&steady["change_hz"]["ci95"][end]));
+    assert!(low < 0.3 && high > -0.3, "{}", steady["meaning"]);
+}

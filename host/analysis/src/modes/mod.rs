@@ -63,6 +63,7 @@ use crate::band::Band;
 use crate::frf::{Frf, FrfError, MotionQuantity};
 use data::Data;
 use nalgebra::DMatrix;
+use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Lines that a band needs at least: one mode and two residual terms have eight real parameters in
@@ -97,6 +98,17 @@ pub struct DrivingPoint {
     pub input: usize,
     /// 1 if both point in the same direction, −1 if in opposite ones.
     pub sign: f64,
+}
+
+/// An output: its sensor, place and direction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputPoint {
+    /// The sensor's name.
+    pub name: String,
+    /// Its position, m; null if it is not known.
+    pub position_m: Option<[f64; 3]>,
+    /// Unit vector of its positive direction; null if it is not known.
+    pub direction: Option<[f64; 3]>,
 }
 
 /// How shape and participation are scaled; their product is the same for all.

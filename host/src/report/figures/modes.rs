@@ -3,7 +3,7 @@
 
 use crate::report::figure::{Axis, Figure, Height, Mark, Marker, Panel, Role, Scene, Shape, Spot, Spread};
 use crate::report::scale::middle_range;
-use crate::report::words::mode_sentences::{first_mode_sentence, values};
+use crate::report::words::mode_sentences::values;
 use crate::report::words::number::decimals;
 use crate::results::{HitFrequency, ModalFit, ModeRow, Results};
 use num_complex::Complex;
@@ -156,7 +156,7 @@ pub fn first_mode(results: &Results) -> Option<Figure> {
         "first-mode",
         "",
         "The first mode over the campaign",
-        format!("{} Bars are each hit's own 95 % interval.", first_mode_sentence(found)),
+        format!("{} Bars are each hit's own 95 % interval.", found.meaning),
     );
     Some(figure.with(Panel::new(x, y).with(mark)))
 }

@@ -8,6 +8,10 @@ use crate::results::{FirstMode, ModalFit, ModeRow};
 /// χ² per degree of freedom above which the model does not explain the FRFs within their noise.
 const MISFIT: f64 = 1.3;
 
+/// Evidence below which a mode may describe an error of the FRFs: about what noise alone gives once
+/// in a thousand identifications of a single FRF.
+const LITTLE: f64 = 40.0;
+
 /// What limits the use of these modes.
 pub fn warnings(found: &FoundModes) -> Vec<String> {
     let modes = &found.modes;
@@ -25,6 +29,14 @@ pub fn warnings(found: &FoundModes) -> Vec<String> {
         told.push(format!(
             "χ² per degree of freedom is {}: the FRFs differ from those of any linear structure by more than their noise. All intervals are widened by its root, and modes may be listed that describe this difference.",
             decimals(modes.chi2_per_dof, 2)
+        ));
+    }
+    let doubtful = modes.modes.iter().filter(|mode| mode.evidence < LITTLE);
+    let doubtful: Vec<String> = doubtful.map(|mode| decimals(mode.frequency_hz, 1)).collect();
+    if !doubtful.is_empty() {
+        told.push(format!(
+            "Doubtful, because without it the other modes would explain the FRFs about as well if their residues were free: {} Hz.",
+            doubtful.join(", ")
         ));
     }
     if !found.left_out.is_empty() {
@@ -73,7 +85,7 @@ pub fn values(mode: &ModeRow) -> [String; 2] {
 }
 
 /// Whether the first mode changed over the campaign.
-pub fn first_mode_sentence(found: &FirstMode) -> String {
+pub fn first_mode(found: &FirstMode) -> String {
     let (hits, tried) = (found.hits.len(), found.hits_tried);
     let mode = format!(
         "The mode at {} Hz, the lowest of the assembly that most hits show ({hits} of {tried}),",
