@@ -31,9 +31,15 @@ const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
 
 /// Options of maturin that compile the host's own code for size: the wheel has a size limit, and
 /// the loops over samples and lines are in other packages (jointrig-analysis, pco, rustfft).
-pub const FOR_SIZE: [&str; 4] = [
+///
+/// One unit of code generation shares what several would each contain, and takes less time in all.
+pub const FOR_SIZE: [&str; 8] = [
+    "--compression-level",
+    "9",
     "--config",
     "profile.release.package.jointrig.opt-level=\"s\"",
+    "--config",
+    "profile.release.package.jointrig.codegen-units=1",
     "--config",
     "profile.release.package.jointrig-uff.opt-level=\"s\"",
 ];
