@@ -27,7 +27,7 @@ const NEWEST: u32 = 20;
 pub const WHEEL: u64 = 5_500_000;
 
 /// The package that builds the wheel, and those that test it where nothing else is installed.
-const TOOLS: [&str; 1] = ["maturin>=1.9,<2"];
+const TOOLS: [&str; 1] = ["maturin>=1.16,<2"];
 
 /// Options of maturin that compile the host's own code for size: the wheel has a size limit, and
 /// the loops over samples and lines are in other packages (jointrig-analysis, pco, rustfft).
@@ -268,7 +268,7 @@ const TARGETS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-g
 const COMPATIBILITY: &str = "manylinux2014";
 
 /// The packages that build and link them.
-const RELEASE_TOOLS: [&str; 2] = ["maturin>=1.9,<2", "ziglang"];
+const RELEASE_TOOLS: [&str; 2] = ["maturin>=1.16,<2", "ziglang"];
 
 /// Builds a wheel for each target into `target/release-wheels`.
 pub fn run_release(project: &Project) -> Result<()> {
