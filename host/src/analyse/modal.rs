@@ -46,9 +46,8 @@ pub struct FoundModes {
 pub const FRF_ERROR: f64 = 0.01;
 
 /// The band in which a campaign's modes are identified, Hz: lower lines contain the drift after the
-/// hammer's blow, and at higher ones arms of a real rig have many modes, of which errors of place and
-/// direction leave little certain.
-pub const MODES_HZ: Band = Band { low_hz: 20.0, high_hz: 600.0 };
+/// hammer's blow.
+pub const MODES_HZ: Band = Band { low_hz: 20.0, high_hz: 1000.0 };
 
 /// Largest distance of the lines used of a campaign, Hz: the exponential window alone makes every
 /// peak about as wide.
