@@ -26,20 +26,11 @@ const LEAST_LINES: f64 = 8.0;
 /// A hit has enough signal if the standard deviation of its frequency is below this fraction.
 const ENOUGH: f64 = 2e-3;
 
-/// Largest part of a hit's signal that the fit may leave ([`Followed::left`]): beyond, a mode that
-/// was not identified changes the frequency, by more than its standard deviation says.
-const LEFT: f64 = 0.05;
-
 /// The mode is followed if this fraction of the hits has enough signal.
 const MOST: f64 = 0.5;
 
 /// Fewest cells of a place of impact: below, their scatter about a straight line is not known.
 const FEWEST_CELLS: usize = 4;
-
-/// The size of a change is told up to this fraction of the distance to the nearest other mode. The
-/// other modes are those of the averaged FRFs, held at their poles: a larger change blurs them, and
-/// then the size and even the sign found are wrong.
-const TOLD: f64 = 0.2;
 
 /// A change is certain beyond this many standard deviations.
 const CERTAIN: f64 = 4.0;
@@ -60,12 +51,7 @@ pub fn first_mode(
     all.iter().find_map(|mode| {
         let found: Vec<(&HitAtContact, Followed)> =
             hits.iter().filter_map(|hit| Some((hit, of_hit(&hit.response, mode, all)?))).collect();
-        let distances = all.iter().filter(|other| *other != mode);
-        let nearest_hz = distances
-            .map(|other| (other.frequency_hz - mode.frequency_hz).abs())
-            .fold(f64::INFINITY, f64::min);
-        (found.len() as f64 > MOST * hits.len() as f64)
-            .then(|| summary(mode, nearest_hz, &found, hits.len(), &session))
+        (found.len() as f64 > MOST * hits.len() as f64).then(|| summary(mode, &found, hits.len(), &session))
     })
 }
 
@@ -88,13 +74,11 @@ fn of_hit(hit: &HitResponse, mode: &Mode, all: &[Mode]) -> Option<Followed> {
     let outputs = hit.per_newton.each_ref().map(|signal| lines.iter().map(|l| signal[*l]).collect());
     let found = follow(&s, &outputs, LENGTH_S - LEAD_S, mode.pole_per_s, &neighbours)?;
     let near = (found.frequency_hz - mode.frequency_hz).abs() < 0.5 * reach;
-    log::debug!("{:.2} Hz ± {:.3}, left {:.3}", found.frequency_hz, found.frequency_std_hz, found.left);
-    (near && found.left < LEFT && found.frequency_std_hz < ENOUGH * found.frequency_hz).then_some(found)
+    (near && found.frequency_std_hz < ENOUGH * found.frequency_hz).then_some(found)
 }
 
 fn summary(
     mode: &Mode,
-    nearest_hz: f64,
     found: &[(&HitAtContact, Followed)],
     hits: usize,
     session: &impl Fn(i64) -> Option<i64>,
@@ -114,11 +98,9 @@ fn summary(
         mode_hz: mode.frequency_hz,
         hits_tried: hits,
         sessions: sessions(found, session),
-        change_hz: change.filter(|change| change.change_hz.abs() < TOLD * nearest_hz).map(|change| {
-            Interval {
-                mean: change.change_hz,
-                ci95: [-1.0, 1.0].map(|sign| change.change_hz + sign * NORMAL_95 * change.std_hz),
-            }
+        change_hz: change.map(|change| Interval {
+            mean: change.change_hz,
+            ci95: [-1.0, 1.0].map(|sign| change.change_hz + sign * NORMAL_95 * change.std_hz),
         }),
         drifts,
         meaning: String::new(),
@@ -238,7 +220,7 @@ mod tests {
                     response: format!("A{cell}"),
                 };
                 let pole_per_s = Complex::new(-1.0, TAU * frequency_hz);
-                let followed = Followed { pole_per_s, frequency_hz, frequency_std_hz: 0.01, left: 0.0 };
+                let followed = Followed { pole_per_s, frequency_hz, frequency_std_hz: 0.01 };
                 hits.push((HitAtContact { cell, record, response }, followed));
             }
         }

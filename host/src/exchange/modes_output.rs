@@ -44,10 +44,10 @@ pub fn write_npz(path: &Path, modes: &Modes, points: &[OutputPoint], scaling: &s
     let noise = if modes.noise == NoiseKnown::Given { "given" } else { "estimated" };
     out.text("noise", &[], &[noise.into()])?;
     out.real("chi2_per_dof", &[], [modes.chi2_per_dof])?;
-    let positions: Option<Vec<[f64; 3]>> = points.iter().map(|point| point.position_m).collect();
-    let directions: Option<Vec<[f64; 3]>> = points.iter().map(|point| point.direction).collect();
-    for (name, known) in [("output_position", positions), ("output_direction", directions)] {
-        if let Some(all) = known {
+    let known: [(&str, fn(&OutputPoint) -> Option<[f64; 3]>); 2] =
+        [("output_position", |p| p.position_m), ("output_direction", |p| p.direction)];
+    for (name, of) in known {
+        if let Some(all) = points.iter().map(of).collect::<Option<Vec<_>>>() {
             out.real(name, &[all.len(), 3], all.as_flattened())?;
         }
     }

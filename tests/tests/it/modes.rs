@@ -191,10 +191,9 @@ fn first_mode(drift_per_hit: f64) -> Value {
 fn a_contact_that_drifts_changes_the_first_mode_and_a_steady_one_does_not() {
     let drifting = first_mode(5e-3);
     assert_eq!(drifting["drifts"], true, "{}", drifting["meaning"]);
-    // the contact stiffens by a quarter: the averaged FRFs show modes that no hit has, and neither
-    // size nor sign of the change follows from them
-    assert_eq!(drifting["change_hz"], Value::Null, "{}", drifting["meaning"]);
-    assert!(drifting["meaning"].as_str().unwrap().contains("by how much is not known"));
+    // with few cells the specimen's own mode beside it is not identified, so the sign is not known
+    let ends = [0, 1].map(|end| number(&drifting["change_hz"]["ci95"][end]));
+    assert!(ends[0] > 0.0 || ends[1] < 0.0, "{}", drifting["meaning"]);
     assert!(drifting["hits"].as_array().unwrap().len() >= 8);
     assert!(drifting["meaning"].as_str().unwrap().contains("not the same in all hits"));
     let steady = first_mode(0.0);

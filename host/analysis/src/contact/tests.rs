@@ -288,11 +288,10 @@ fn lasers_together_on_arm_b_compare_their_gains() {
         assert!((difference - stated).abs() < 3.0 * sigma, "{stated}: {difference} ± {sigma}");
         assert!(sigma < 5e-4, "{sigma}");
     }
-    // taken for those of the spots, the same signals contradict the other cells
+    // the same signals taken for those of the spots contradict the plan
     input.cells.iter_mut().for_each(|cell| cell.lasers = false);
     let taken_for_spots = stiffness(&input).expect("all is there");
-    assert!(taken_for_spots.diagnosis.calibration.chi_square > 100.0, "{taken_for_spots:?}");
-    assert_eq!(taken_for_spots.doubts, [Doubt::Force]);
+    assert!(!taken_for_spots.contradictions.is_empty(), "{taken_for_spots:?}");
 }
 
 #[test]

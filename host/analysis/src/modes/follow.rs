@@ -24,13 +24,8 @@ pub struct Followed {
     pub pole_per_s: C,
     /// Natural frequency, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz, from what the fit leaves of the values. It assumes noise that is
-    /// independent from line to line.
+    /// Its standard deviation, Hz, from what the fit leaves of the values.
     pub frequency_std_hz: f64,
-    /// What the fit leaves of the values over the mode's own part of them, both as root of the sum
-    /// of squares, in the output with the least of it: noise, or another mode that is not among
-    /// the neighbours and then changes the frequency.
-    pub left: f64,
 }
 
 /// The mode near `start` (1/s) in the `outputs`, each with one value per line `s` of a record that
@@ -61,7 +56,7 @@ pub fn follow(s: &[C], outputs: &[Vec<C>], length_s: f64, start: C, neighbours: 
         let orthogonal = basis.qr();
         let (q, r) = (orthogonal.q(), orthogonal.r());
         let rest = |v: &DVector<C>| v - &q * q.ad_mul(v);
-        let (mut product, mut square, mut least) = (C::from(0.0), 0.0, f64::INFINITY);
+        let (mut product, mut square) = (C::from(0.0), 0.0);
         for values in outputs {
             let values = DVector::from_column_slice(values);
             let left = rest(&values);
@@ -69,9 +64,8 @@ pub fn follow(s: &[C], outputs: &[Vec<C>], length_s: f64, start: C, neighbours: 
             let slope = s.iter().map(|s| {
                 residue * (peak(pole, *s) - length_s_times(left_at_end(pole, *s), length_s)) / (s - pole)
             });
-            let slope = rest(&DVector::from_iterator(values.len(), slope));
-            let own = s.iter().map(|s| (residue * peak(pole, *s)).norm_sqr()).sum::<f64>();
-            least = f64::min(least, (left.norm_squared() / own).sqrt());
+            let slope = DVector::from_iterator(values.len(), slope);
+            let slope = rest(&slope);
             // variance of the real part
             let variance = left.norm_squared() / (2.0 * freedom);
             // exact values are limited by rounding
@@ -95,7 +89,6 @@ pub fn follow(s: &[C], outputs: &[Vec<C>], length_s: f64, start: C, neighbours: 
                 pole_per_s: pole,
                 frequency_hz: pole.norm() / TAU,
                 frequency_std_hz: square.sqrt().recip() / TAU,
-                left: least,
             });
         }
     }

@@ -102,9 +102,6 @@ pub fn first_mode(found: &FirstMode) -> String {
         }
         (Some(false), Some(change)) => format!("{mode} did not change: {change}."),
         (_, Some(change)) => format!("{mode} changed by {change}, which decides nothing."),
-        (Some(true), None) => format!(
-            "{mode} changed, by how much is not known because it is not small against the distance to other modes: contact or clamps were not the same in all hits."
-        ),
-        (_, None) => format!("{mode} was seen in too few cells, or too near other modes, to tell a change."),
+        (_, None) => format!("{mode} was seen in too few cells to tell a change."),
     }
 }
