@@ -132,8 +132,7 @@ fn time_response(
     function.into()
 }
 
-/// Header and units.
-pub(super) fn start() -> Vec<DataSet> {
+fn start() -> Vec<DataSet> {
     let header = Header { program: "jointrig".into(), ..Header::default() };
     vec![DataSet::Header(header), DataSet::Units(Units::si())]
 }

@@ -24,7 +24,6 @@ mod live_page;
 mod live_spectra;
 mod load_cells;
 mod mishaps;
-mod modes;
 mod own_rig;
 mod plan_command;
 mod python;

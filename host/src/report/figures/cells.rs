@@ -104,13 +104,7 @@ pub fn geometry(places: &[Place]) -> Option<Figure> {
     let bodies = boxes.collect();
     let spots = places
         .iter()
-        .map(|p| Spot {
-            name: p.name.clone(),
-            role: role(p.grouping),
-            at: p.position_m,
-            toward: p.direction,
-            moves: None,
-        })
+        .map(|p| Spot { name: p.name.clone(), role: role(p.grouping), at: p.position_m, toward: p.direction })
         .collect();
     let panel = Panel::new(Axis::linear("", "", [0.0, 1.0]), Axis::linear("", "", [0.0, 1.0]))
         .high(Height::Square)

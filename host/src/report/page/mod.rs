@@ -208,11 +208,10 @@ fn failed(html: &mut Html, results: &Results) {
 
 type Drawn<'a> = [(&'a Entry, Option<Figure>)];
 
-const CHAPTERS: [(Chapter, &str, &str); 6] = [
+const CHAPTERS: [(Chapter, &str, &str); 5] = [
     (Chapter::SideBySide, "side-by-side", "What each measurement sees"),
     (Chapter::Joint, "joint", "Joint by substructuring"),
     (Chapter::Loops, "loops", "Contact by loops"),
-    (Chapter::Modes, "modes", "Modes"),
     (Chapter::Measured, "measured", "What was measured"),
     (Chapter::Frfs, "frfs", "Frequency response functions"),
 ];
@@ -298,7 +297,6 @@ fn tables_beside(results: &Results, figure: &str) -> Vec<Option<String>> {
 fn tables_of(results: &Results, chapter: Chapter) -> Vec<Option<String>> {
     match chapter {
         Chapter::Answer | Chapter::Frfs => Vec::new(),
-        Chapter::Modes => vec![tables::modes(results)],
         Chapter::Measured => vec![tables::completeness(results), missing(results)],
         Chapter::SideBySide => vec![tables::checks(results)],
         Chapter::Joint => {
