@@ -44,8 +44,8 @@ pub fn short_contact_plan() -> String {
     let mut text = CONTACT.to_owned();
     for (old, new) in [
         ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
-        ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
-        ("\"C4\", \"N1\", \"N2\", \"D1\", \"D2\", \"D3\", \"M1\", \"M2\", \"B1\"", "\"B1\""),
+        ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\", \"I_MZ\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
+        ("\"C4\", \"D1\", \"D2\", \"D3\", \"B1\"", "\"B1\""),
         ("wanted = 3", "wanted = 2"),
         ("length_s = 2.0", "length_s = 1.0"),
         ("exponential_per_s = 2.3", "exponential_per_s = 4.6"),

@@ -92,7 +92,7 @@ fn rigs_not_used_in_development() {
 fn a_contact_that_changes_while_it_is_hit_is_noticed() {
     let found = |number, drift: f64| {
         let mut rig = RigConfig::elastic();
-        rig.contact.drift_per_hit = drift / 207.0;
+        rig.contact.drift_per_hit = drift / 201.0;
         let found = results(number, &rig, &contact_plan(&rig));
         (found.check("contact-steady").unwrap().clone(), found.answer.unwrap().contact)
     };
@@ -247,7 +247,7 @@ const FALSE: [False; 17] = [
     ("delays of 20 µs", |rig, _| rig.errors.skew_s *= 10.0, &["delay"]),
     (
         "k_T drifts by 5 to 10 %",
-        |rig, i| rig.contact.drift_per_hit = [0.07, -0.07, 0.1, 0.05, -0.1][i] / 207.0,
+        |rig, i| rig.contact.drift_per_hit = [0.07, -0.07, 0.1, 0.05, -0.1][i] / 201.0,
         &["contact changed"],
     ),
     (
