@@ -18,7 +18,7 @@ import jointrig as jr
 def test_status_and_records_are_the_commands(lab_file: Path) -> None:
     lab = jr.open(lab_file)
     assert lab.status() == json.loads(command("campaign", "status", lab_file, "--json").stdout)
-    assert "201 of 134 good hits" in repr(lab) and lab.path == lab_file
+    assert "201 of 201 good hits" in repr(lab) and lab.path == lab_file
     records = lab.records(configuration="AJB", impact="AZ1", kept=True)
     assert records and all(r.impact == "AZ1" and r.kept and r.verdict == "good" for r in records)
     shown = json.loads(
