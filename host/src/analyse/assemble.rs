@@ -190,7 +190,11 @@ fn find<'c>(cells: &'c [CellAverage], impact: &Point, location: &str) -> Option<
 }
 
 /// Rows and columns of a complete part, found by repeatedly leaving out the worst row or column.
-fn complete(rows: usize, columns: usize, there: impl Fn(usize, usize) -> bool) -> (Vec<usize>, Vec<usize>) {
+pub(super) fn complete(
+    rows: usize,
+    columns: usize,
+    there: impl Fn(usize, usize) -> bool,
+) -> (Vec<usize>, Vec<usize>) {
     let (mut kept_rows, mut kept_columns): (Vec<usize>, Vec<usize>) =
         ((0..rows).collect(), (0..columns).collect());
     loop {

@@ -9,7 +9,8 @@ use super::checks::between_the_arms;
 use super::findings::{Findings, Settings};
 use super::from_frfs::{Fit, NoFit, Substructured, fits, recommended};
 use super::missing::{Missing, given_up};
-use super::{cells_stage, chosen, configuration_stage, contact_answer, contact_stage};
+use super::modal::{FoundModes, MODES_HZ};
+use super::{cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -18,6 +19,7 @@ use crate::substructuring::between_arms::{BELOW, BetweenArms, NoStiffness, Unfit
 use crate::substructuring::fit::{FitError, Fitted};
 use crate::substructuring::geometry::Grouping;
 use crate::substructuring::{Band, Frf, Geometry, IdmSet, Method, fit, identify, keep_common_lines};
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// Analyses the measurements. The caller adds the provenance and the equipment used.
@@ -78,8 +80,8 @@ pub fn analyse_measurements<M: Measurements>(
         .unwrap_or_default();
     missing.extend(recommended.missing);
 
-    // the fit between the arms, and beside it the contact's own stiffness from the hits: each uses
-    // cores that the other leaves idle
+    // the fit between the arms, and beside it the contact's own stiffness from the hits and the
+    // modes: each uses cores that the others leave idle
     let between_the_arms_by_fit = || {
         let Ok([a, b, ajb]) = all_three(alike) else {
             let without = NoStiffness::Neither { fit: Unfit::NotMade, recommended: Unfit::Unchecked };
@@ -91,8 +93,21 @@ pub fn analyse_measurements<M: Measurements>(
         let decided = decided(&fits, &recommended.estimates, below);
         (fits, decided)
     };
-    let ((fits, between_arms), own) =
-        rayon::join(between_the_arms_by_fit, || contact_answer::answer(measurements, &cells.averages));
+    let modes_of = |(structure, frf): (Structure, Option<&Frf>)| {
+        let points = geometry.points(structure);
+        frf.map(|frf| (structure, FoundModes::of_structure(structure, frf, points, MODES_HZ)))
+    };
+    let all_modes = || Structure::ALL.into_par_iter().zip(frfs).filter_map(modes_of).collect::<Vec<_>>();
+    let ((fits, between_arms), (own, all_modes)) = rayon::join(between_the_arms_by_fit, || {
+        rayon::join(|| contact_answer::answer(measurements, &cells.averages), all_modes)
+    });
+    let mut modes = Vec::new();
+    for (configuration, found) in all_modes {
+        match found {
+            Ok(found) => modes.push(found),
+            Err(why) => missing.push(Missing::Modes { configuration, why }),
+        }
+    }
 
     // the specimens: loops, levels, and their stiffness compared with that between the arms
     let fitted: Vec<_> = fits.iter().filter_map(|fit| Some(fit.outcome.as_ref().ok()?.row())).collect();
@@ -125,6 +140,10 @@ pub fn analyse_measurements<M: Measurements>(
         contact: Some(contact),
         own_stiffness: Some(own_stiffness),
         between_arms: Some(between_arms),
+        first_mode: first_mode::first_mode(&modes, &cells.at_contact, |record| {
+            measurements.session_of(record)
+        }),
+        modes,
         missing,
         ..Findings::default()
     }

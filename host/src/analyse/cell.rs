@@ -144,6 +144,11 @@ pub trait Measurements: Sync {
         Vec::new()
     }
 
+    /// The session in which a record was made.
+    fn session_of(&self, _record: i64) -> Option<i64> {
+        None
+    }
+
     /// FRFs of a configuration that were measured elsewhere.
     ///
     /// # Errors

@@ -8,10 +8,11 @@ use super::contact_stage::Contact;
 use super::from_frfs::Fit;
 use super::from_frfs::Substructured;
 use super::missing::Missing;
+use super::modal::FoundModes;
 use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
 use crate::results::{
-    Bootstrap, Cells, Completeness, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
+    Bootstrap, Cells, Completeness, FirstMode, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
 };
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -58,6 +59,10 @@ pub struct Findings {
     pub own_stiffness: Option<Result<Stiffness, ContactError>>,
     /// The stiffness between the arms, in a campaign.
     pub between_arms: Option<Result<BetweenArms, NoStiffness>>,
+    /// The modes of each structure.
+    pub modes: Vec<FoundModes>,
+    /// The assembly's first mode in every hit.
+    pub first_mode: Option<FirstMode>,
     /// The loops of a single record.
     pub record: Option<RecordLoops>,
     /// Missing data, in the order in which they were noticed.

@@ -10,6 +10,7 @@ use super::cell::{
 };
 use super::chosen::DataQuality;
 use super::findings::Findings;
+use super::modal::{FoundModes, NoModes};
 use super::plan_geometry::{geometry, places};
 use crate::campaign::plan::{Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
@@ -29,8 +30,8 @@ use crate::results;
 use crate::results::{Calibrated, Cells, Completeness, HitRow, Source, rounded};
 use crate::spectra::MotionQuantity;
 use crate::structure::Structure;
-use crate::substructuring::Frf;
 use crate::substructuring::geometry::{Geometry, Grouping};
+use crate::substructuring::{Band, Frf};
 use jointrig_protocol::channel::{Quantity, Role};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -448,6 +449,11 @@ impl Measurements for CampaignFile {
         self.cells.iter().map(|c| c.name.clone()).collect()
     }
 
+    fn session_of(&self, record: i64) -> Option<i64> {
+        let rows = self.records.values().flatten().flatten();
+        rows.filter(|row| row.id == record).map(|row| row.session).next()
+    }
+
     fn given_up(&self) -> Vec<(CellName, String)> {
         self.cells.iter().filter_map(|c| Some((c.name.clone(), c.given_up.clone()?))).collect()
     }
@@ -814,6 +820,14 @@ impl CampaignFile {
         let points = self.geometry().points(structure);
         let found = everything(points, &averages, self.quantity());
         (found.map(|frf| (frf, hits(points, &averages))), complaints)
+    }
+
+    /// The modes of a structure from its FRFs, in `band`.
+    ///
+    /// # Errors
+    /// [`NoModes`].
+    pub fn modes(&self, structure: Structure, frf: &Frf, band: Band) -> Result<FoundModes, NoModes> {
+        FoundModes::of_structure(structure, frf, self.geometry().points(structure), band)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Data missing in an analysis, and the reasons.
 
 use super::cell::CellName;
+use super::modal::NoModes;
 use crate::campaign::plan::level::Level;
 use crate::hysteresis::HysteresisError;
 use crate::structure::Structure;
@@ -105,6 +106,13 @@ pub enum Missing {
     Substructuring(IdentifyError),
     /// No CMIF.
     Cmif(FrfError),
+    /// A structure's modes cannot be identified.
+    Modes {
+        /// The structure.
+        configuration: Structure,
+        /// The reason.
+        why: NoModes,
+    },
     /// No bootstrap over hits.
     Bootstrap(AveragedError),
     /// No estimate with an interval.

@@ -23,10 +23,12 @@ mod contact_stage;
 #[cfg(feature = "sim")]
 pub mod expected;
 mod findings;
+mod first_mode;
 mod from_frfs;
 mod from_store;
 mod impact_loops;
 mod missing;
+mod modal;
 mod plan_geometry;
 mod question;
 #[cfg(test)]
@@ -50,6 +52,9 @@ pub use from_store::AnalyseError;
 pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
+pub use modal::{
+    FRF_ERROR, FoundModes, MODES_HZ, NoModes, labelled_driving_points, labelled_point, whole_band,
+};
 pub use plan_geometry::{geometry, geometry_as_planned, places};
 pub use question::{Asked, IdmSets, Question, QuestionError};
 pub use shaker_levels::NoLevelStiffness;

@@ -154,7 +154,8 @@ fn read(path: &Path, points: &Configuration, units: &StatedUnits) -> Result<Frf,
     Ok(frf)
 }
 
-fn band(text: &str) -> Result<Band, String> {
+/// A band in Hz, ends included.
+pub(super) fn band(text: &str) -> Result<Band, String> {
     let wrong = || format!("`{text}` is not a band: write LO:HI in Hz, for example 300:600");
     let (low, high) = text.split_once(':').ok_or_else(wrong)?;
     let number = |text: &str| f64::from_str(text.trim()).ok().filter(|f| f.is_finite() && *f >= 0.0);

@@ -29,6 +29,7 @@ mod hysteresis;
 mod identify;
 mod import;
 mod info;
+mod modes;
 #[cfg(feature = "dashboard")]
 mod open_page;
 mod output;
@@ -86,6 +87,8 @@ enum Command {
     Import(import::Import),
     /// Identify a joint from any FRFs.
     Identify(identify::Identify),
+    /// Identify natural frequencies, damping and shapes.
+    Modes(modes::ModesArgs),
     /// Print completions for a shell.
     Completions(Completions),
     /// Print the manual page, or write one for each command.
@@ -129,6 +132,7 @@ impl Cli {
             Command::Hysteresis(command) => command.run(),
             Command::Import(command) => command.run(),
             Command::Identify(command) => command.run(),
+            Command::Modes(command) => command.run(),
             Command::Completions(command) => {
                 command.run();
                 Ok(())
@@ -250,6 +254,8 @@ mod tests {
             "report p.jrig --out d --figures svg,csv",
             "compare p.jrig q.jrig --out d --json",
             "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method internal,inverse --idms 4,6 --band 300:600 --json",
+            "modes c.jrig --structure A,AJB --band 20:800 --json --out modes.unv",
+            "modes AJB.npz --json",
             "completions bash",
             "man --out pages",
             "import DIR --into c.jrig --names names.csv --replace",
@@ -284,6 +290,9 @@ mod tests {
             "hysteresis",
             "campaign check p.jrig --mass 1.2",
             "info",
+            "modes",
+            "modes c.jrig --structure C",
+            "modes c.jrig --band 800:20",
             "identify --a A.npz --b B.npz --ajb AJB.npz",
             "identify --a A.npz --b B.npz --ajb AJB.npz --geometry p.xlsx --method none",
         ] {

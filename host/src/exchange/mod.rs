@@ -4,7 +4,7 @@
 //! arrays make an FRF matrix, impact records or a hysteresis record. [`positions`] reads the pyFBS
 //! workbook, as xlsx or as a folder of csv tables. [`uff`] is the universal file; [`frf_uff`] and
 //! [`record_uff`] define which of its functions make FRFs or records; [`frf_file`] accepts either
-//! form. [`units`] holds the only table of units, [`labelled_frf`] the only rule for signed
+//! form. [`modes_output`] writes modes in both. [`units`] holds the only table of units, [`labelled_frf`] the only rule for signed
 //! directions; it and [`record_file`] hold what was read with both. A
 //! [`typed_table::Table`] is written as comma-separated text or, with the feature `parquet`, as
 //! typed columns.
@@ -18,6 +18,7 @@ pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod labelled_frf;
+pub mod modes_output;
 mod npy_header;
 pub mod npz;
 pub mod npz_long;

@@ -132,7 +132,8 @@ fn time_response(
     function.into()
 }
 
-fn start() -> Vec<DataSet> {
+/// Header and units.
+pub(super) fn start() -> Vec<DataSet> {
     let header = Header { program: "jointrig".into(), ..Header::default() };
     vec![DataSet::Header(header), DataSet::Units(Units::si())]
 }

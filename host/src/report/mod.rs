@@ -17,7 +17,7 @@ use std::path::Path;
 use std::{fs, io};
 use words::warning_sentences;
 
-pub use document::{compare, document};
+pub use document::{compare, document, mode_rows, scaling};
 pub use page::{chart_style, comparison_page, figure_fragment, page, script};
 
 pub mod cell_records;

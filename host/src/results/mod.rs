@@ -6,7 +6,8 @@
 //! NaN. Every document contains its [`Source`]: file, record ids, settings, version.
 //!
 //! Here: the answer, the checks, the comparison of two campaigns and the provenance. `joint`: the
-//! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured.
+//! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured; `modal`: the
+//! modes.
 
 use crate::campaign::store::SimulatedTruth;
 use crate::contact::{Contradiction, Diagnosis, Doubt, Interval, OfFrequency};
@@ -25,12 +26,16 @@ pub use joint::{
 };
 pub use loops::{Backbone, DecayStep, Force, Hysteresis, ImpactSlope, LoopCurve, Reconstruction, ShakerLoop};
 pub use measured::{CellRow, Cells, FrfCurve, HitRow, NoiseFloor, Place, Role, UsableBand};
+pub use modal::{
+    ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, PoleOnly, SensorPlace, SessionFrequency,
+};
 
 #[cfg(test)]
 pub(crate) mod example_tests;
 mod joint;
 mod loops;
 mod measured;
+mod modal;
 
 /// Version of the format: 1.
 pub const VERSION: u32 = 1;
@@ -67,6 +72,15 @@ pub struct Results {
     /// The joint line by line; absent if nothing was identified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint_spectrum: Option<JointSpectrum>,
+    /// The modes of all structures, by rising frequency.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modes: Vec<ModeRow>,
+    /// How the modes of each structure were identified, with its stabilisation chart.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modal: Vec<ModalFit>,
+    /// The assembly's first mode in every hit of a campaign.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_mode: Option<FirstMode>,
     /// The contact by loops.
     pub hysteresis: Vec<Hysteresis>,
     /// Whether the numbers are credible.

@@ -1,9 +1,9 @@
 //! Universal files (UFF): the exchange format of modal analysis, read and written.
 //!
 //! A universal file is a sequence of data sets between lines of `    -1`. Supported data sets: 58
-//! and 58b ([`Function`]: FRFs, time signals, spectra, coherence), 15 and 2411 ([`Node`]), 82
-//! ([`TraceLine`]), 2412 ([`Element`]), 151 ([`Header`]), 164 ([`Units`]). Others are listed with
-//! their number and position.
+//! and 58b ([`Function`]: FRFs, time signals, spectra, coherence), 55 ([`NodalData`]: mode shapes),
+//! 15 and 2411 ([`Node`]), 82 ([`TraceLine`]), 2412 ([`Element`]), 151 ([`Header`]), 164
+//! ([`Units`]). Others are listed with their number and position.
 //!
 //! An accelerance of three lines, written and read again:
 //!
@@ -69,12 +69,14 @@ mod round_trip_tests;
 mod set151;
 mod set164;
 mod set2412;
+mod set55;
 mod set58;
 mod set58_values;
 mod set82;
 
 pub use function::{Abscissa, Axis, ByteOrder, Dof, Encoding, Function, Precision, Values, kind, quantity};
 pub use nodes::Node;
+pub use set55::NodalData;
 pub use set82::TraceLine;
 pub use set151::Header;
 pub use set164::Units;
@@ -90,6 +92,8 @@ use std::fmt;
 pub enum DataSet {
     /// 58 or 58b: a function at a degree of freedom.
     Function(Box<Function>),
+    /// 55: data at nodes, such as a mode shape.
+    NodalData(NodalData),
     /// 15: nodes, single precision.
     Nodes(Vec<Node>),
     /// 2411: nodes, double precision.
@@ -109,6 +113,7 @@ impl DataSet {
     pub fn number(&self) -> u32 {
         match self {
             DataSet::Function(_) => 58,
+            DataSet::NodalData(_) => 55,
             DataSet::Nodes(_) => 15,
             DataSet::NodesDouble(_) => 2411,
             DataSet::TraceLine(_) => 82,
@@ -275,6 +280,7 @@ fn one(
     let body = lines::Lines::of(block.body);
     let set = match block.number {
         58 => set58::read(&block).map(DataSet::from),
+        55 => set55::read(body).map(DataSet::NodalData),
         15 => nodes::read(body).map(DataSet::Nodes),
         2411 => nodes::read(body).map(DataSet::NodesDouble),
         82 => set82::read(body).map(DataSet::TraceLine),
@@ -320,6 +326,7 @@ pub fn write(sets: &[DataSet]) -> Result<Vec<u8>, WriteError> {
         let mut out = lines::Output::default();
         let written = match set {
             DataSet::Function(function) => set58::write(function, &mut out),
+            DataSet::NodalData(data) => set55::write(data, &mut out),
             DataSet::Nodes(nodes) => nodes::write_single(nodes, &mut out),
             DataSet::NodesDouble(nodes) => nodes::write_double(nodes, &mut out),
             DataSet::TraceLine(line) => set82::write(line, &mut out),

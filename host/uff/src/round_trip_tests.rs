@@ -126,6 +126,23 @@ prop_compose! {
     }
 }
 
+prop_compose! {
+    fn nodal()(
+        id in [text(80), text(80), text(80), text(80), text(80)], kinds in [0..9i64, 0..9i64, 0..9i64, 0..20i64],
+        integers in vec(0..99_999i64, 0..12), reals in vec(number(), 0..12), is_complex in any::<bool>(),
+        nodes in (1..8usize).prop_flat_map(|n| vec((1..9_999i64, vec([number(), number()], n..=n)), 0..4)),
+    ) -> NodalData {
+        let keep = |v: f64| kept(v, Precision::Single, Encoding::Ascii);
+        let value = |v: [f64; 2]| Complex::new(keep(v[0]), if is_complex { keep(v[1]) } else { 0.0 });
+        let [model, analysis, characteristic, quantity] = kinds;
+        NodalData {
+            id, model, analysis, characteristic, quantity, integers, is_complex,
+            reals: reals.into_iter().map(keep).collect(),
+            nodes: nodes.into_iter().map(|(n, of)| (n, of.into_iter().map(value).collect())).collect(),
+        }
+    }
+}
+
 pub(super) fn set() -> impl Strategy<Value = DataSet> {
     prop_oneof![
         4 => function().prop_map(|f| DataSet::Function(Box::new(f))),
@@ -140,6 +157,7 @@ pub(super) fn set() -> impl Strategy<Value = DataSet> {
             .prop_map(|(number, color, name, nodes)| DataSet::TraceLine(TraceLine { number, color, name, nodes })),
         1 => vec(element(), 0..5).prop_map(DataSet::Elements),
         1 => header().prop_map(DataSet::Header),
+        1 => nodal().prop_map(DataSet::NodalData),
         1 => (1..10i64, text(20), 1..3i64, [number(), number(), number(), number()]).prop_map(|(code, description, mode, n)| {
             DataSet::Units(Units {
                 code, description, temperature_mode: mode, length: n[0], force: n[1], temperature: n[2], temperature_offset: n[3],

@@ -24,6 +24,7 @@ mod live_page;
 mod live_spectra;
 mod load_cells;
 mod mishaps;
+mod modes;
 mod own_rig;
 mod plan_command;
 mod python;

@@ -325,11 +325,11 @@ fn apart(hits: &[&HitResponse], usual: &[&HitResponse], signal: usize, band: [f6
 /// little of it passes the contact.
 pub const LINES_HZ: [f64; 2] = [60.0, 700.0];
 
-/// Length of record used, s: slip shows in the first cycles, and noise accumulates after them.
-const LENGTH_S: f64 = 0.3;
+/// Length of record used, from [`LEAD_S`] before the pulse's peak, s: slip shows in the first cycles, and noise accumulates after them.
+pub const LENGTH_S: f64 = 0.3;
 
 /// Time kept before the pulse's peak, s.
-const LEAD_S: f64 = 2e-3;
+pub const LEAD_S: f64 = 2e-3;
 
 /// Decay rate of the exponential window, 1/s: what remains at the truncated end is small, and the
 /// same fraction for every hit.

@@ -46,6 +46,7 @@
 
 mod data;
 mod evidence;
+mod follow;
 mod likelihood;
 mod plscf;
 #[cfg(test)]
@@ -54,6 +55,7 @@ mod random_rigs;
 mod tests;
 mod uncertainty;
 
+pub use follow::{Followed, follow};
 pub use plscf::{STABLE_DAMPING, STABLE_FREQUENCY, STABLE_MAC};
 
 use crate::C;
@@ -61,6 +63,7 @@ use crate::band::Band;
 use crate::frf::{Frf, FrfError, MotionQuantity};
 use data::Data;
 use nalgebra::DMatrix;
+use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Lines that a band needs at least: one mode and two residual terms have eight real parameters in
@@ -95,6 +98,17 @@ pub struct DrivingPoint {
     pub input: usize,
     /// 1 if both point in the same direction, −1 if in opposite ones.
     pub sign: f64,
+}
+
+/// An output: its sensor, place and direction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputPoint {
+    /// The sensor's name.
+    pub name: String,
+    /// Its position, m; null if it is not known.
+    pub position_m: Option<[f64; 3]>,
+    /// Unit vector of its positive direction; null if it is not known.
+    pub direction: Option<[f64; 3]>,
 }
 
 /// How shape and participation are scaled; their product is the same for all.
@@ -323,6 +337,20 @@ pub fn mac(a: &[C], b: &[C]) -> f64 {
     }
     let both = of_a * of_b;
     if both > 0.0 { (product.norm_sqr() / both).min(1.0) } else { 0.0 }
+}
+
+/// Modal phase collinearity of a shape: 1 if all components move in phase or in opposite phase
+/// (a real shape times any complex factor), 0 for a travelling wave; 1 also for one component, and
+/// for none that moves.
+pub fn phase_collinearity(shape: &[C]) -> f64 {
+    let (mut re_re, mut re_im, mut im_im) = (0.0, 0.0, 0.0);
+    for v in shape {
+        re_re += v.re * v.re;
+        re_im += v.re * v.im;
+        im_im += v.im * v.im;
+    }
+    let all: f64 = re_re + im_im;
+    if all > 0.0 { (((re_re - im_im).powi(2) + 4.0 * re_im * re_im) / (all * all)).min(1.0) } else { 1.0 }
 }
 
 /// Why modes are not identified.

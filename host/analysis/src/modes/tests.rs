@@ -400,3 +400,13 @@ fn a_large_matrix() {
         found.chi2_per_dof,
     );
 }
+
+#[test]
+fn phase_collinearity_is_one_in_phase_and_zero_for_a_travelling_wave() {
+    let turned = C::from_polar(1.0, 0.7);
+    let in_phase: Vec<C> = [1.0, -0.5, 0.2].iter().map(|v| turned * v).collect();
+    assert!((phase_collinearity(&in_phase) - 1.0).abs() < 1e-12);
+    let travelling: Vec<C> = (0..8).map(|k| C::from_polar(1.0, f64::from(k) * TAU / 8.0)).collect();
+    assert!(phase_collinearity(&travelling) < 1e-12);
+    assert_eq!(phase_collinearity(&[]), 1.0);
+}

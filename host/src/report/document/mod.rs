@@ -3,17 +3,21 @@
 //! This includes the findings on the interface, converted to the format of the results, and the
 //! provenance of the results: the information in the file, and how the analysis used its records.
 
-use super::words::{check_sentences, side_by_side, warning_sentences};
+use super::words::{check_sentences, mode_sentences, side_by_side, warning_sentences};
 use crate::analyse::Findings;
-use crate::results::{InterfaceModes, MAIN_BAND, Results, Source, VERSION, VirtualPoint, ranges, rounded};
+use crate::results::{
+    FirstMode, InterfaceModes, MAIN_BAND, Results, Source, VERSION, VirtualPoint, ranges, rounded,
+};
 use crate::substructuring::VirtualPointQuality;
 use crate::substructuring::cmif::Cmif;
 use serde_json::{Map, json};
 
 pub use compared_from_results::compare;
+pub use from_modes::{mode_rows, scaling};
 
 mod compared_from_results;
 mod from_findings;
+mod from_modes;
 
 /// Builds `results.json` from all findings.
 pub fn document(found: Findings) -> Results {
@@ -23,6 +27,7 @@ pub fn document(found: Findings) -> Results {
     let answer = from_findings::answer(&found);
     let (joint, refused) = from_findings::joint_rows(&found);
     let hysteresis = from_findings::loop_rows(&found);
+    let (modes, modal) = mode_rows(&found.modes);
     let mut results = Results {
         version: VERSION,
         source,
@@ -30,6 +35,9 @@ pub fn document(found: Findings) -> Results {
         joint,
         recommended: found.recommended,
         bootstrap: found.bootstrap,
+        modes,
+        modal,
+        first_mode: found.first_mode.map(with_meaning),
         hysteresis,
         checks,
         refused,
@@ -65,6 +73,10 @@ pub fn document(found: Findings) -> Results {
     }
     results.side_by_side = side_by_side::kinds(&results);
     results
+}
+
+fn with_meaning(found: FirstMode) -> FirstMode {
+    FirstMode { meaning: mode_sentences::first_mode(&found), ..found }
 }
 
 /// The source in the findings, with the settings of the analysis and the records used.

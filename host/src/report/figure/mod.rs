@@ -222,6 +222,9 @@ pub struct Spot {
     /// The hammer's direction; absent for a response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub toward: Option<[f64; 3]>,
+    /// How far the point moves in a mode, enlarged, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moves: Option<[f64; 3]>,
 }
 
 impl Panel {

@@ -104,7 +104,13 @@ pub fn geometry(places: &[Place]) -> Option<Figure> {
     let bodies = boxes.collect();
     let spots = places
         .iter()
-        .map(|p| Spot { name: p.name.clone(), role: role(p.grouping), at: p.position_m, toward: p.direction })
+        .map(|p| Spot {
+            name: p.name.clone(),
+            role: role(p.grouping),
+            at: p.position_m,
+            toward: p.direction,
+            moves: None,
+        })
         .collect();
     let panel = Panel::new(Axis::linear("", "", [0.0, 1.0]), Axis::linear("", "", [0.0, 1.0]))
         .high(Height::Square)

@@ -13,6 +13,7 @@ mod consistency;
 mod contact_loop;
 mod joint_spectrum;
 mod levels;
+mod modes;
 mod noise_floor;
 mod receptances;
 mod shaker_loops;
@@ -37,6 +38,8 @@ pub enum Chapter {
     Loops,
     /// What was measured: positions, number and quality of the hits.
     Measured,
+    /// Natural frequencies, damping and shapes.
+    Modes,
     /// Frequency response functions.
     Frfs,
 }
@@ -103,6 +106,9 @@ pub const ALL: &[Entry] = &[
         "hits on the assembly in which a resonance of one specimen hides",
         contact_loop::rebuilt,
     ),
+    entry(Chapter::Modes, "Stabilisation chart", "FRFs of several lines", modes::stabilisation),
+    entry(Chapter::Modes, "Shapes of the modes", "modes at points whose positions are known", modes::shapes),
+    entry(Chapter::Modes, "The first mode over the campaign", IMPACTS, modes::first_mode),
     entry(Chapter::Frfs, "Receptances", "records of hits, or imported FRFs", receptances::receptances),
     entry(
         Chapter::Frfs,

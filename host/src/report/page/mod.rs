@@ -208,10 +208,11 @@ fn failed(html: &mut Html, results: &Results) {
 
 type Drawn<'a> = [(&'a Entry, Option<Figure>)];
 
-const CHAPTERS: [(Chapter, &str, &str); 5] = [
+const CHAPTERS: [(Chapter, &str, &str); 6] = [
     (Chapter::SideBySide, "side-by-side", "What each measurement sees"),
     (Chapter::Joint, "joint", "Joint by substructuring"),
     (Chapter::Loops, "loops", "Contact by loops"),
+    (Chapter::Modes, "modes", "Modes"),
     (Chapter::Measured, "measured", "What was measured"),
     (Chapter::Frfs, "frfs", "Frequency response functions"),
 ];
@@ -297,6 +298,7 @@ fn tables_beside(results: &Results, figure: &str) -> Vec<Option<String>> {
 fn tables_of(results: &Results, chapter: Chapter) -> Vec<Option<String>> {
     match chapter {
         Chapter::Answer | Chapter::Frfs => Vec::new(),
+        Chapter::Modes => vec![tables::modes(results)],
         Chapter::Measured => vec![tables::completeness(results), missing(results)],
         Chapter::SideBySide => vec![tables::checks(results)],
         Chapter::Joint => {

@@ -41,6 +41,8 @@ class SceneView{
     const right=z*cy-x*sy,near=z*sy+x*cy;
     return[right,-(y*cp-near*sp),y*sp+near*cp];
   }
+  // where a spot moves in a mode
+  moved(s){return s.moves?s.at.map((v,i)=>v+s.moves[i]):s.at}
   corners(b){return Array.from({length:8},(_,i)=>[0,1,2].map(a=>i>>a&1?b.high[a]:b.low[a]))}
   redraw(){
     const w=this.host.clientWidth||600,h=this.high||Math.max(320,Math.min(460,.8*w)),svg=this.svg;
@@ -65,7 +67,7 @@ class SceneView{
   // draws everything with a pen of four strokes, on a sheet of w × h px
   paint(pen,w,h){
     const side=role=>/-a$/.test(role)?1:/-b$/.test(role)?-1:0;
-    const all=[...this.scene.bodies.flatMap(b=>this.corners(b)),...this.scene.spots.map(s=>s.at)].map(p=>this.seen(p));
+    const all=[...this.scene.bodies.flatMap(b=>this.corners(b)),...this.scene.spots.flatMap(s=>[s.at,this.moved(s)])].map(p=>this.seen(p));
     const ends=i=>[Math.min(...all.map(p=>p[i])),Math.max(...all.map(p=>p[i]))];
     const[left,right]=ends(0),[top,bottom]=ends(1),reach=.5*Math.max(1e-3,Math.hypot(right-left,bottom-top));
     // leave space for names next to the outermost positions, and for moving arms
@@ -83,6 +85,7 @@ class SceneView{
     const spots=[...this.scene.spots].map(s=>[s,at(s.at,s.role)]).sort((a,b)=>a[1][2]-b[1][2]);
     for(const[s,p]of spots){
       if(s.toward)pen.line(at(s.at.map((v,i)=>v-.014*s.toward[i]),s.role),p,s.role,2);
+      if(s.moves){const tip=at(this.moved(s),s.role);pen.line(p,tip,s.role,2);pen.dot(tip,s.role)}
       if(s.toward)pen.dot(p,s.role);
       else pen.square(p,s.role);
     }

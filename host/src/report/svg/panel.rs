@@ -4,7 +4,7 @@
 use super::drawing::{Anchor, Area, Drawing, Stroke};
 use super::marks;
 use super::marks::PanelFrame;
-use crate::report::figure::{Axis, Body, Height, Marker, Panel, Scene, Shape};
+use crate::report::figure::{Axis, Body, Height, Marker, Panel, Scene, Shape, Spot};
 use crate::report::scale::{Lie, Scale, Tick};
 
 const FRAME: Stroke<'_> = Stroke::new("frame", 1.0);
@@ -153,7 +153,7 @@ fn seen([x, y, z]: [f64; 3]) -> [f64; 3] {
 /// The whole scene within `area`.
 fn draw_scene(drawing: &mut Drawing, area: Area, scene: &Scene) {
     let corners: Vec<[f64; 3]> =
-        scene.bodies.iter().flat_map(corners).chain(scene.spots.iter().map(|s| s.at)).map(seen).collect();
+        scene.bodies.iter().flat_map(corners).chain(scene.spots.iter().flat_map(ends)).map(seen).collect();
     let reach = |i: usize| {
         let all = corners.iter().map(|c| c[i]);
         [all.clone().fold(f64::INFINITY, f64::min), all.fold(f64::NEG_INFINITY, f64::max)]
@@ -191,6 +191,11 @@ fn draw_scene(drawing: &mut Drawing, area: Area, scene: &Scene) {
             let from = std::array::from_fn(|i| spot.at[i] - 0.014 * toward[i]);
             drawing.line(at(from), place, Stroke::new(&class, 2.0));
         }
+        if spot.moves.is_some() {
+            let [rest, moved] = ends(spot).map(at);
+            drawing.line(rest, moved, Stroke::new(&class, 2.0));
+            marks::draw_marker(drawing, moved, spot.role, Marker::Dot);
+        }
         let marker = if spot.toward.is_some() { Marker::Dot } else { Marker::Frame };
         marks::draw_marker(drawing, place, spot.role, marker);
         let width = 6.8 * spot.name.chars().count() as f64;
@@ -221,6 +226,12 @@ fn scene_axes(drawing: &mut Drawing, size: f64, origin: [f64; 2]) {
             name,
         );
     }
+}
+
+/// Where a spot is at rest and where it moves.
+fn ends(spot: &Spot) -> [[f64; 3]; 2] {
+    let moves = spot.moves.unwrap_or_default();
+    [spot.at, std::array::from_fn(|i| spot.at[i] + moves[i])]
 }
 
 fn corners(body: &Body) -> impl Iterator<Item = [f64; 3]> {

@@ -11,11 +11,13 @@ pub use checks::virtual_points;
 pub use joint::recommended;
 pub use joint::{joint, refusals};
 pub use loops::{decay, hysteresis, side_by_side, static_arm};
+pub use modes::modes;
 pub use provenance::{calibrations, completeness, provenance};
 
 mod checks;
 mod joint;
 mod loops;
+mod modes;
 mod provenance;
 
 /// Text for an unknown value.

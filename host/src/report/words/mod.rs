@@ -5,6 +5,7 @@ pub(super) mod answer_sentences;
 pub mod brief;
 pub(super) mod check_sentences;
 pub(super) mod level_sentences;
+pub mod mode_sentences;
 mod names;
 pub mod number;
 pub mod side_by_side;

@@ -19,6 +19,17 @@ pub fn with_scatter(mean: f64, std: f64) -> String {
     format!("{} ± {}", decimals(mean, places), decimals(std, places))
 }
 
+/// The decimals that show two digits of half an interval, at most nine.
+pub fn interval_places(half: f64) -> usize {
+    places(half, 2).min(9)
+}
+
+/// `mean ± half`, both with the decimals that show two digits of `half`, at most nine.
+pub fn to_its_interval(mean: f64, half: f64) -> String {
+    let places = interval_places(half);
+    format!("{} ± {}", decimals(mean, places), decimals(half, places))
+}
+
 /// A stiffness in N/m, shown in N/µm without the unit.
 pub fn micro(stiffness_n_per_m: f64) -> f64 {
     stiffness_n_per_m * 1e-6

@@ -213,6 +213,7 @@ pub fn missing(missing: &Missing) -> String {
         ),
         Missing::Substructuring(error) => format!("Substructuring was not possible: {error}."),
         Missing::Cmif(error) => format!("No CMIF: {error}."),
+        Missing::Modes { configuration, why } => format!("{configuration}: no modes: {why}."),
         Missing::Bootstrap(error) => format!("No bootstrap over hits: {error}."),
         Missing::Estimate(error) => format!("No estimate with an interval by Eq. A.1: {error}."),
         Missing::Level(told) => told.clone(),
