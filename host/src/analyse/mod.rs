@@ -53,7 +53,7 @@ pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
 pub use modal::{
-    FRF_ERROR, FoundModes, MODES_HZ, NoModes, labelled_driving_points, labelled_point, whole_band,
+    FRF_ERROR, FoundModes, MODES_HZ, NoModes, Search, labelled_driving_points, labelled_point, whole_band,
 };
 pub use plan_geometry::{geometry, geometry_as_planned, places};
 pub use question::{Asked, IdmSets, Question, QuestionError};

@@ -36,8 +36,8 @@ pub struct FoundModes {
     pub driving_points: usize,
     /// Outputs and inputs that are not used because some of their FRFs are missing.
     pub left_out: Vec<String>,
-    /// The value whose variance is not known: then all variances are ignored, and the noise is
-    /// estimated from the residuals.
+    /// Why the variances of the FRFs are not used; then their error is `frf_error` alone, or, if that
+    /// is zero, estimated from the residuals.
     pub without_variance: Option<String>,
 }
 
@@ -53,6 +53,28 @@ pub const MODES_HZ: Band = Band { low_hz: 20.0, high_hz: 600.0 };
 /// Largest distance of the lines used of a campaign, Hz: the exponential window alone makes every
 /// peak about as wide.
 const STEP_HZ: f64 = 1.0;
+
+/// Most work of the search in a campaign's structure: some 20 s. The FRFs of a good campaign need a
+/// hundredth of it.
+const MOST_WORK: u64 = 10_000_000_000;
+
+/// Where and how modes are searched for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// The band.
+    pub band: Band,
+    /// Error of the FRFs in addition to their noise, relative.
+    pub frf_error: f64,
+    /// As in [`Settings`].
+    pub most_work: u64,
+}
+
+impl Search {
+    /// In this band and with this error of the FRFs, as long as [`Settings::of`] allows.
+    pub fn of(band: Band, frf_error: f64) -> Self {
+        Search { band, frf_error, most_work: Settings::of(band).most_work }
+    }
+}
 
 /// Why a structure has no modes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -73,27 +95,27 @@ pub fn whole_band(frf: &Frf) -> Band {
 }
 
 impl FoundModes {
-    /// The modes of `frf` in `band`, with this error of the FRFs in addition to their noise. Outputs
-    /// and inputs with missing values are left out; `points_of` gives place and direction of
-    /// outputs, `driving_points` the driving points of what is left.
+    /// The modes of `frf`. Outputs and inputs with missing values are left out; `points_of` gives
+    /// place and direction of outputs, `driving_points` the driving points of what is left.
     ///
     /// # Errors
     /// [`NoModes`].
     pub fn of(
         structure: Option<Structure>,
         frf: &Frf,
-        (band, frf_error): (Band, f64),
+        Search { band, frf_error, most_work }: Search,
         points_of: impl Fn(&str) -> OutputPoint,
         driving_points: impl Fn(&Frf) -> Vec<DrivingPoint>,
     ) -> Result<Self, NoModes> {
         let (frf, left_out) = without_gaps(&frf.band(band.low_hz, band.high_hz), band)?;
-        let frf = with_error(frf, frf_error)?;
-        let settings = Settings { driving_points: driving_points(&frf), ..Settings::of(band) };
-        let (modes, without_variance) = match modes::identify(&frf, &settings) {
+        let settings = Settings { driving_points: driving_points(&frf), most_work, ..Settings::of(band) };
+        let why = frf.variance().is_none().then(|| "the FRFs have no variance".to_owned());
+        let (modes, without_variance) = match modes::identify(&with_error(&frf, frf_error)?, &settings) {
             Err(error @ ModesError::UnknownVariance { .. }) => {
-                (modes::identify(&frf.without_noise(), &settings)?, Some(error.to_string()))
+                let frf = with_error(&frf.without_noise(), frf_error)?;
+                (modes::identify(&frf, &settings)?, Some(error.to_string()))
             }
-            found => (found?, None),
+            found => (found?, why),
         };
         let points = modes.outputs.iter().map(|name| points_of(name)).collect();
         let driving_points = settings.driving_points.len();
@@ -115,7 +137,7 @@ impl FoundModes {
         Self::of(
             Some(structure),
             &frf,
-            (band, FRF_ERROR),
+            Search { band, frf_error: FRF_ERROR, most_work: MOST_WORK },
             |name| of_points(points, name),
             |frf| driving_points(frf, points),
         )
@@ -191,17 +213,23 @@ fn few_columns(frf: &Frf, points: &Configuration, band: Band) -> Result<Frf, NoM
     Ok(of_arms.select(&outputs, &chosen).map_err(ModesError::Frf)?)
 }
 
-/// The same FRFs, their variances enlarged by the relative error; FRFs without variances are left as
-/// they are.
-fn with_error(frf: Frf, error: f64) -> Result<Frf, ModesError> {
-    let Some(variance) = frf.variance() else { return Ok(frf) };
-    let enlarged = frf.lines().iter().zip(variance).map(|(line, variance)| {
+/// The same FRFs, their variances enlarged by the relative error, which is all that FRFs without
+/// variances have then.
+fn with_error(frf: &Frf, error: f64) -> Result<Frf, ModesError> {
+    if error == 0.0 {
+        return Ok(frf.clone());
+    }
+    let enlarged = frf.lines().iter().enumerate().map(|(l, line)| {
         let mean_square = line.norm_squared() / line.len().max(1) as f64;
         // half of the squared modulus is the real part's share
-        variance.zip_map(line, |v, y| v + 0.5 * error * error * (mean_square + y.norm_sqr()))
+        let own = line.map(|y| 0.5 * error * error * (mean_square + y.norm_sqr()));
+        match frf.variance() {
+            Some(variance) => own + &variance[l],
+            None => own,
+        }
     });
     let enlarged = enlarged.collect();
-    Ok(frf.with_variance(enlarged)?)
+    Ok(frf.clone().with_variance(enlarged)?)
 }
 
 /// The largest part of the matrix that has all its values, and the names of what is left out.
@@ -375,9 +403,13 @@ mod tests {
 
     #[test]
     fn the_error_adds_to_the_variance_and_gaps_leave_out_what_they_belong_to() {
-        let enlarged = with_error(frf(), 0.1).expect("variances");
+        let enlarged = with_error(&frf(), 0.1).expect("variances");
         let variance = enlarged.variance().expect("there")[0][(0, 0)];
         assert!((variance - (1e-4 + 0.01)).abs() < 1e-12, "{variance}");
+        let without = with_error(&frf().without_noise(), 0.1).expect("variances");
+        let variance = without.variance().expect("there")[0][(0, 0)];
+        assert!((variance - 0.01).abs() < 1e-12, "{variance}");
+        assert!(with_error(&frf().without_noise(), 0.0).expect("none").variance().is_none());
         let holed = frf().map_lines(|_, mut y| y[(0, 1)] = Complex::new(f64::NAN, 0.0));
         let (kept, left_out) = without_gaps(&holed, BAND).expect("some are whole");
         assert!(kept.check_finite().is_ok() && left_out.len() == 1, "{left_out:?}");

@@ -5,8 +5,8 @@ use super::identify::band;
 use super::output;
 use super::output::not_negative;
 use crate::analyse::{
-    CampaignFile, FRF_ERROR, FoundModes, KnownContact, MODES_HZ, labelled_driving_points, labelled_point,
-    whole_band,
+    CampaignFile, FRF_ERROR, FoundModes, KnownContact, MODES_HZ, Search, labelled_driving_points,
+    labelled_point, whole_band,
 };
 use crate::campaign::store::Store;
 use crate::exchange::{LabelledFrf, StatedUnits, modes_output, read_frf_file};
@@ -135,7 +135,7 @@ impl ModesArgs {
         FoundModes::of(
             None,
             frf,
-            (band, self.frf_error),
+            Search::of(band, self.frf_error),
             |output| labelled_point(&read, output),
             |frf| labelled_driving_points(frf, &read),
         )

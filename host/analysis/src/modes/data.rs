@@ -6,6 +6,7 @@ use crate::C;
 use crate::frf::{Frf, FrfError};
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// FRFs of one band and their weights.
 ///
@@ -36,6 +37,8 @@ pub(super) struct Data {
     pub(super) weight: DMatrix<f64>,
     /// Whether the variances are those of the noise or only relative.
     pub(super) noise: NoiseKnown,
+    /// Multiplications that the fits have taken so far, roughly.
+    work: AtomicU64,
 }
 
 impl Data {
@@ -96,7 +99,24 @@ impl Data {
             y,
             weight,
             noise,
+            work: AtomicU64::new(0),
         })
+    }
+
+    /// Counts one step of a fit with this number of columns per cell. The sum does not depend on
+    /// the order in which parallel fits are counted, so that a search which it ends has the same
+    /// result on every machine.
+    pub(super) fn count_step(&self, columns: usize) {
+        let (lines, cells) = (self.lines() as u64, self.cells() as u64);
+        let columns = columns as u64;
+        // inner products of the columns; residuals and gradient; elimination in every cell
+        let work = columns * columns * lines + 2 * columns * lines * cells + columns.pow(3) * cells / 3;
+        self.work.fetch_add(work, Ordering::Relaxed);
+    }
+
+    /// Multiplications that the fits have taken so far, roughly.
+    pub(super) fn work(&self) -> u64 {
+        self.work.load(Ordering::Relaxed)
     }
 
     pub(super) fn lines(&self) -> usize {

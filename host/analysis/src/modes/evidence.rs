@@ -76,8 +76,14 @@ pub(super) fn scale(data: &Data, at: &Evaluation) -> f64 {
 /// Relative variance of values that are exact but for rounding; below it nothing is evidence.
 const ROUNDING: f64 = 1e-20;
 
-/// The model with all poles and residual terms that the data give evidence for.
-pub(super) fn select(data: &Data, starts: &[C], settings: &Settings) -> Evaluation {
+/// The model with all poles and residual terms that the data give evidence for, and whether the
+/// search for them came to its end.
+///
+/// It is ended after the work that the settings allow: data that no linear structure gives (FRFs
+/// of impacts at differing places, without any noise to explain the differences) have evidence for
+/// ever more poles. Half of the work is kept for removing poles without evidence.
+pub(super) fn select(data: &Data, starts: &[C], settings: &Settings) -> (Evaluation, bool) {
+    let most_work = settings.most_work;
     let starts: Vec<C> = starts.iter().copied().filter(|pole| is_mode(data, *pole, settings)).collect();
     let start = with_shapes(data, &starts, &POWERS).unwrap_or_else(|| Model::empty(data, &POWERS));
     let mut at = fit_roughly(data, start);
@@ -85,24 +91,27 @@ pub(super) fn select(data: &Data, starts: &[C], settings: &Settings) -> Evaluati
     while let Some(r) = at.model.poles.iter().position(|pole| !is_mode(data, *pole, settings)) {
         at = fit_roughly(data, at.model.without(r));
     }
+    let mut complete = true;
     for _ in 0..ROUNDS {
         // first all additions: as long as something is not described, the noise seems larger than
         // it is, and what is needed would be removed
         let mut additions = 0;
-        while scale(data, &at) > ROUNDING && additions < ADDITIONS {
+        while scale(data, &at) > ROUNDING && additions < ADDITIONS && data.work() < most_work / 2 {
             let Some(better) = with_one_more(data, &at, settings) else { break };
             at = better;
             additions += 1;
         }
+        complete &= data.work() < most_work / 2;
         let before = at.model.poles.len();
-        at = without_insignificant(data, at);
+        at = without_insignificant(data, at, most_work);
         if additions == 0 || at.model.poles.len() == before {
             break;
         }
     }
     let at = fit(data, at.model);
-    let at = without_insignificant(data, at);
-    fit(data, at.model)
+    let at = without_insignificant(data, at, most_work);
+    complete &= data.work() < most_work;
+    (fit(data, at.model), complete)
 }
 
 fn within(data: &Data, pole: C) -> bool {
@@ -127,8 +136,9 @@ pub(super) fn is_mode(data: &Data, pole: C, settings: &Settings) -> bool {
 /// Distance of two poles, in half widths, below which each is removed on trial.
 const CLOSE: f64 = 0.5;
 
-/// Removes the poles without evidence, the weakest first.
-fn without_insignificant(data: &Data, mut at: Evaluation) -> Evaluation {
+/// Removes the poles without evidence, the weakest first, as long as less than `most_work` has been
+/// done.
+fn without_insignificant(data: &Data, mut at: Evaluation, most_work: u64) -> Evaluation {
     loop {
         let poles = &at.model.poles;
         let Some(normal) = Normal::new(data, &at) else { return at };
@@ -148,6 +158,9 @@ fn without_insignificant(data: &Data, mut at: Evaluation) -> Evaluation {
         doubtful.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
         let mut next = None;
         for (mode, [_, at_most], needed) in doubtful {
+            if data.work() >= most_work {
+                return at;
+            }
             let without = fit_to_the_end(data, at.model.without(mode));
             if at_most < needed || without.chi2 - at.chi2 < needed {
                 next = Some(without);

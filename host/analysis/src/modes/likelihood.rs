@@ -650,6 +650,7 @@ fn minimise(data: &Data, mut start: Model, steps: usize, accuracy: f64, slow: f6
     let first = at.chi2;
     let mut damping = 1e-4;
     for _ in 0..steps {
+        data.count_step(at.basis.ncols());
         let Some(normal) = Normal::new(data, &at) else { return at };
         let (next, promised) = loop {
             if let Some((mut model, promised)) = normal.step(&at.model, damping) {

@@ -80,12 +80,19 @@ pub struct Settings {
     /// Outputs and inputs at the same place and direction; they fix the scale of the shapes. None:
     /// the largest component of each shape is one.
     pub driving_points: Vec<DrivingPoint>,
+    /// Multiplications after which the search for modes ends, roughly. It is a number and not a
+    /// time, so that the result is the same on every machine: 10¹⁰ are 10 to 20 s on one core.
+    pub most_work: u64,
 }
 
+/// Ten times what the most laborious of forty random rigs needs; a campaign's structure needs a
+/// thousandth of it.
+const MOST_WORK: u64 = 100_000_000_000;
+
 impl Settings {
-    /// A damping ratio up to 0.2, no driving points.
+    /// A damping ratio up to 0.2, no driving points, a search of at most about two minutes.
     pub fn of(band: Band) -> Settings {
-        Settings { band, damping_limit: 0.2, driving_points: vec![] }
+        Settings { band, damping_limit: 0.2, driving_points: vec![], most_work: MOST_WORK }
     }
 }
 
@@ -234,6 +241,10 @@ pub struct Modes {
     pub degrees_of_freedom: f64,
     /// Whether the noise was known.
     pub noise: NoiseKnown,
+    /// Whether the search came to its end. If not, the FRFs have evidence for more poles than it
+    /// looked for: they are not those of one linear structure within their noise. Modes may then be
+    /// missing, and others may be none.
+    pub complete: bool,
     /// The stabilisation chart.
     pub chart: Chart,
 }
@@ -250,7 +261,7 @@ pub fn identify(frf: &Frf, settings: &Settings) -> Result<Modes, ModesError> {
     let data = Data::new(frf, settings)?;
     let orders = plscf::poles(&data, settings);
     let starts = plscf::starts(&data, &orders);
-    let at = evidence::select(&data, &starts, settings);
+    let (at, complete) = evidence::select(&data, &starts, settings);
     let (all, residuals) = uncertainty::results(&data, &at, &settings.driving_points)
         .ok_or(ModesError::Undetermined { modes: at.model.poles.len() })?;
     let (modes, background) = all
@@ -266,6 +277,7 @@ pub fn identify(frf: &Frf, settings: &Settings) -> Result<Modes, ModesError> {
         chi2_per_dof: at.chi2_per_dof(&data),
         degrees_of_freedom: likelihood::degrees_of_freedom(&data, &at.model),
         noise: data.noise,
+        complete,
         chart: plscf::chart(&data, &orders),
     })
 }

@@ -232,6 +232,33 @@ fn what_cannot_be_identified_is_refused_with_the_reason() {
     assert!(refused(&zero, &band(50.0, 150.0)).contains("zero"));
 }
 
+/// The second column is that of a slightly stiffer structure, and its gain varies with frequency:
+/// without noise to explain this, every further pole describes a part of it.
+#[test]
+fn a_search_without_end_is_ended_and_says_so() {
+    let hz = axis(20.0, 0.5, 400);
+    let [one, other] = [1e6, 1.00002e6]
+        .map(|k| Masses::two(1.0, k, 0.3 * k, 1e-6).frf(hz.clone(), 2.3, MotionQuantity::Velocity));
+    let lines = one.lines().iter().zip(other.lines()).zip(&hz);
+    let lines = lines.map(|((one, other), f)| {
+        let mut line = one.clone();
+        line.set_column(1, &other.column(1).map(|y| y * (1.0 + 1e-4 * (f / 50.0).sin())));
+        line
+    });
+    let (outputs, inputs) = (one.outputs().to_vec(), one.inputs().to_vec());
+    let frf = Frf::new(hz.clone(), 2.3, MotionQuantity::Velocity, outputs, inputs, lines.collect());
+    let frf = frf.expect("all agree");
+    let settings = Settings { most_work: 100_000_000, ..Settings::of(Band { low_hz: 20.0, high_hz: 219.5 }) };
+    let found = identify(&frf, &settings).expect("modes");
+    assert!(!found.complete, "{} modes", found.modes.len());
+    // the same FRFs with an error that explains the differences
+    let variance: Vec<DMatrix<f64>> =
+        frf.lines().iter().map(|line| line.map(|y| 1e-4 * (y.norm_sqr() + 1e-12))).collect();
+    let frf = frf.with_variance(variance).expect("all agree");
+    let found = identify(&frf, &settings).expect("modes");
+    assert!(found.complete && found.modes.len() == 2, "{} modes", found.modes.len());
+}
+
 #[test]
 fn noise_alone_has_no_modes() {
     for seed in 0..5 {

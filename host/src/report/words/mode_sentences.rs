@@ -16,20 +16,30 @@ const LITTLE: f64 = 40.0;
 pub fn warnings(found: &FoundModes) -> Vec<String> {
     let modes = &found.modes;
     let mut told = Vec::new();
+    let estimated = modes.noise == NoiseKnown::Estimated;
     if let Some(why) = &found.without_variance {
-        told.push(format!(
-            "{why}: all variances are ignored, the noise is estimated from what the modes leave of the FRFs."
-        ));
-    } else if modes.noise == NoiseKnown::Estimated {
-        told.push(
-            "The FRFs have no variance: the noise is estimated from what the modes leave of them, so nothing tells whether the modes explain the FRFs."
-                .into(),
-        );
-    } else if modes.chi2_per_dof > MISFIT {
+        told.push(if estimated {
+            format!(
+                "No variances are used ({why}): the noise is estimated from what the modes leave of the FRFs, so nothing tells whether the modes explain the FRFs."
+            )
+        } else {
+            format!(
+                "No variances are used ({why}): an error of {} % of each FRF is assumed, and intervals and evidence are as good as this assumption.",
+                decimals(100.0 * found.frf_error, 1)
+            )
+        });
+    }
+    if !estimated && modes.chi2_per_dof > MISFIT {
         told.push(format!(
             "χ² per degree of freedom is {}: the FRFs differ from those of any linear structure by more than their noise. All intervals are widened by its root, and modes may be listed that describe this difference.",
             decimals(modes.chi2_per_dof, 2)
         ));
+    }
+    if !modes.complete {
+        told.push(
+            "The search was ended before it had found all poles that the FRFs give evidence for: they are not those of one linear structure within the error that is assumed. Modes may be missing, and others may be none; assume a larger error, or a narrower band."
+                .into(),
+        );
     }
     let doubtful = modes.modes.iter().filter(|mode| mode.evidence < LITTLE);
     let doubtful: Vec<String> = doubtful.map(|mode| decimals(mode.frequency_hz, 1)).collect();
