@@ -38,12 +38,18 @@ impl Frf {
     /// # Errors
     /// A label and its point have different axes: both are named.
     pub fn along(&self, points: &Configuration) -> Result<(jointrig::frf::Frf, Vec<String>), String> {
+        match &self.labels {
+            Some(_) => self.labelled().along(points),
+            None => Ok((self.matrix.clone(), Vec::new())),
+        }
+    }
+
+    /// The FRFs with the labels of their file, if there was one.
+    pub fn labelled(&self) -> LabelledFrf {
         let read = LabelledFrf::unlabelled(self.matrix.clone(), String::new(), Vec::new());
         match &self.labels {
-            Some((outputs, inputs)) => {
-                LabelledFrf { outputs: outputs.clone(), inputs: inputs.clone(), ..read }.along(points)
-            }
-            None => Ok((self.matrix.clone(), Vec::new())),
+            Some((outputs, inputs)) => LabelledFrf { outputs: outputs.clone(), inputs: inputs.clone(), ..read },
+            None => read,
         }
     }
 

@@ -52,6 +52,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lab::new, module)?)?;
     module.add_function(wrap_pyfunction!(signals::frf, module)?)?;
     module.add_function(wrap_pyfunction!(signals::identify, module)?)?;
+    module.add_function(wrap_pyfunction!(signals::modes, module)?)?;
     module.add_function(wrap_pyfunction!(signals::hysteresis, module)?)?;
     Ok(())
 }

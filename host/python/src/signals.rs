@@ -1,14 +1,14 @@
-//! Analyses of arrays: FRFs of impact records, loops, and the joint from FRFs of A, B and the
-//! assembly.
+//! Analyses of arrays: FRFs of impact records, loops, modes, and the joint from FRFs of A, B and
+//! the assembly.
 
 use crate::frf::Frf;
 use crate::lab::{Analysis, Of};
-use crate::{in_the_process_that_loaded_this, interruptible, raised};
-use jointrig::analyse::{Asked, Findings, IdmSets, Question, RecordLoops};
+use crate::{in_the_process_that_loaded_this, interruptible, raised, values};
+use jointrig::analyse::{Asked, Findings, FoundModes, IdmSets, Question, RecordLoops};
 use jointrig::campaign::verdict::{Limits, Verdict, judge_all};
 use jointrig::exchange::read_geometry;
 use jointrig::hysteresis::{HysteresisError, HysteresisRecord, RelativeMotion, analyse};
-use jointrig::report::document;
+use jointrig::report::{document, mode_rows};
 use jointrig::results::Source;
 use jointrig::spectra::{CrossSpectra, FrfSettings, ImpactRecords, MotionQuantity, estimate};
 use jointrig::substructuring::Band;
@@ -16,6 +16,7 @@ use jointrig::substructuring::averaged::Priors;
 use nalgebra::{Complex, DMatrix, Scalar};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// FRFs of the good hits of impact records, with the verdict on every hit: (Frf, verdicts).
@@ -148,6 +149,27 @@ pub fn hysteresis(
     found
         .map(|found| Analysis::of(found, Of::Frfs(Vec::new())))
         .map_err(|error: HysteresisError| raised::refused(py, &error.to_string()))
+}
+
+/// The modes of FRFs, as `jointrig modes FILE --json` prints them.
+#[pyfunction]
+#[pyo3(signature = (*, frf, band_hz, frf_error))]
+pub fn modes<'py>(
+    py: Python<'py>,
+    frf: &Bound<'_, Frf>,
+    band_hz: Option<(f64, f64)>,
+    frf_error: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    in_the_process_that_loaded_this(py)?;
+    if !(frf_error.is_finite() && frf_error >= 0.0) {
+        return Err(raised::refused(py, "frf_error: a standard deviation is a number, zero or more"));
+    }
+    let band = band_hz.map(|(low_hz, high_hz)| Band { low_hz, high_hz });
+    let read = frf.get().labelled();
+    let found = interruptible::run(py, move |_| FoundModes::of_labelled(&read, band, frf_error))?;
+    let found = found.map_err(|error| raised::refused(py, &error.to_string()))?;
+    let (modes, modal) = mode_rows(&[found]);
+    values(py, &json!({ "modes": modes, "modal": modal }).to_string())
 }
 
 /// Results of `jointrig identify` for these FRFs; the second value contains the messages about the

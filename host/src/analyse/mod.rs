@@ -52,9 +52,7 @@ pub use from_store::AnalyseError;
 pub use from_store::{AnalysedLength, CampaignFile, analyse};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
-pub use modal::{
-    FRF_ERROR, FoundModes, MODES_HZ, NoModes, Search, labelled_driving_points, labelled_point, whole_band,
-};
+pub use modal::{FRF_ERROR, FoundModes, MODES_HZ, NoModes};
 pub use plan_geometry::{geometry, geometry_as_planned, places};
 pub use question::{Asked, IdmSets, Question, QuestionError};
 pub use shaker_levels::NoLevelStiffness;

@@ -60,20 +60,13 @@ const MOST_WORK: u64 = 10_000_000_000;
 
 /// Where and how modes are searched for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Search {
+struct Search {
     /// The band.
-    pub band: Band,
+    band: Band,
     /// Error of the FRFs in addition to their noise, relative.
-    pub frf_error: f64,
+    frf_error: f64,
     /// As in [`Settings`].
-    pub most_work: u64,
-}
-
-impl Search {
-    /// In this band and with this error of the FRFs, as long as [`Settings::of`] allows.
-    pub fn of(band: Band, frf_error: f64) -> Self {
-        Search { band, frf_error, most_work: Settings::of(band).most_work }
-    }
+    most_work: u64,
 }
 
 /// Why a structure has no modes.
@@ -88,7 +81,7 @@ pub enum NoModes {
 }
 
 /// The band of all lines of these FRFs above 0 Hz.
-pub fn whole_band(frf: &Frf) -> Band {
+fn whole_band(frf: &Frf) -> Band {
     let lines = frf.frequency_hz();
     let low_hz = lines.iter().copied().find(|f| *f > 0.0).unwrap_or(0.0);
     Band { low_hz, high_hz: lines.last().copied().unwrap_or(0.0) }
@@ -97,10 +90,7 @@ pub fn whole_band(frf: &Frf) -> Band {
 impl FoundModes {
     /// The modes of `frf`. Outputs and inputs with missing values are left out; `points_of` gives
     /// place and direction of outputs, `driving_points` the driving points of what is left.
-    ///
-    /// # Errors
-    /// [`NoModes`].
-    pub fn of(
+    fn of(
         structure: Option<Structure>,
         frf: &Frf,
         Search { band, frf_error, most_work }: Search,
@@ -120,6 +110,21 @@ impl FoundModes {
         let points = modes.outputs.iter().map(|name| points_of(name)).collect();
         let driving_points = settings.driving_points.len();
         Ok(FoundModes { structure, modes, points, frf_error, driving_points, left_out, without_variance })
+    }
+
+    /// The modes of FRFs of a file or of arrays, in this band or on all their lines.
+    ///
+    /// # Errors
+    /// [`NoModes`].
+    pub fn of_labelled(read: &LabelledFrf, band: Option<Band>, frf_error: f64) -> Result<Self, NoModes> {
+        let band = band.unwrap_or_else(|| whole_band(&read.frf));
+        Self::of(
+            None,
+            &read.frf,
+            Search { band, frf_error, most_work: Settings::of(band).most_work },
+            |output| labelled_point(read, output),
+            |frf| labelled_driving_points(frf, read),
+        )
     }
 
     /// The modes of a campaign's structure: from the outputs on its arms and one impact along each
@@ -297,7 +302,7 @@ fn driving_points(frf: &Frf, points: &Configuration) -> Vec<DrivingPoint> {
 
 /// Outputs and inputs of `frf` whose labels in the file it was read from name the same place and
 /// axis; labels without an axis say nothing about it.
-pub fn labelled_driving_points(frf: &Frf, read: &LabelledFrf) -> Vec<DrivingPoint> {
+fn labelled_driving_points(frf: &Frf, read: &LabelledFrf) -> Vec<DrivingPoint> {
     let label = |names: &[String], labels: &[Label], name: &String| {
         names.iter().position(|own| own == name).and_then(|at| labels.get(at).cloned())
     };
@@ -318,7 +323,7 @@ pub fn labelled_driving_points(frf: &Frf, read: &LabelledFrf) -> Vec<DrivingPoin
 
 /// Place and direction of an output according to its label in a file, or to the axis in its name,
 /// as in `A1:x`.
-pub fn labelled_point(read: &LabelledFrf, output: &str) -> OutputPoint {
+fn labelled_point(read: &LabelledFrf, output: &str) -> OutputPoint {
     let label = read.frf.outputs().iter().position(|own| own == output).map(|at| &read.outputs[at]);
     let axis = |axis: usize| {
         let mut direction = [0.0; 3];

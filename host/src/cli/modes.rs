@@ -4,17 +4,14 @@ use super::error::CliError;
 use super::identify::band;
 use super::output;
 use super::output::not_negative;
-use crate::analyse::{
-    CampaignFile, FRF_ERROR, FoundModes, KnownContact, MODES_HZ, Search, labelled_driving_points,
-    labelled_point, whole_band,
-};
+use crate::analyse::{CampaignFile, FRF_ERROR, FoundModes, KnownContact, MODES_HZ};
 use crate::campaign::store::Store;
 use crate::exchange::{LabelledFrf, StatedUnits, modes_output, read_frf_file};
 use crate::report::words::mode_sentences;
 use crate::report::{mode_rows, scaling};
 use crate::results::{ModalFit, ModeRow};
 use crate::structure::Structure;
-use crate::substructuring::{Band, Frf};
+use crate::substructuring::Band;
 use crate::untrusted_text::tell_line;
 use clap::Args;
 use serde::Serialize;
@@ -130,16 +127,8 @@ impl ModesArgs {
         for note in &read.notes {
             tell_line!("jointrig: {}: {note}", self.file.display());
         }
-        let frf: &Frf = &read.frf;
-        let band = self.band.unwrap_or_else(|| whole_band(frf));
-        FoundModes::of(
-            None,
-            frf,
-            Search::of(band, self.frf_error),
-            |output| labelled_point(&read, output),
-            |frf| labelled_driving_points(frf, &read),
-        )
-        .map_err(|error| CliError::Bad(format!("{}: {error}", self.file.display())))
+        FoundModes::of_labelled(&read, self.band, self.frf_error)
+            .map_err(|error| CliError::Bad(format!("{}: {error}", self.file.display())))
     }
 
     fn write(&self, found: &FoundModes, out: &Path, several: bool) -> Result<(), CliError> {

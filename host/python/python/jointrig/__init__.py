@@ -41,6 +41,7 @@ __all__ = [
     "hysteresis",
     "identify",
     "make_frf",
+    "modes",
     "new",
     "open",
     "read_frf",
@@ -154,6 +155,17 @@ def identify(
     )
     _warn(notes)
     return found
+
+
+def modes(y: Frf | Path, *, band_hz: tuple[float, float] | None = None, frf_error: float = 0.01) -> dict[str, Any]:
+    """The modes of one structure's FRFs, without picking poles: what `jointrig modes FILE --json` prints.
+
+    y: Frf, or a file of FRFs. band_hz: (low, high), all lines where none is given. frf_error: error of the FRFs beyond their variance,
+    as a fraction. "modes" of the result is a list by rising frequency: frequency_hz and damping_ratio with mean and ci95, shape and
+    participation by output and input; "modal" says how they were found, with warnings and the stabilisation chart. A campaign's modes are in
+    `lab.analyse().results["modes"]`. Raises Refused where nothing can be identified. docs/modes.md has the method.
+    """
+    return _native.modes(frf=_matrix(y), band_hz=band_hz, frf_error=frf_error)
 
 
 def frf(

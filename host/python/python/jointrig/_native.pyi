@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __version__: str
-__all__ = ["__version__", "Lab", "Record", "Frf", "Analysis", "new", "frf", "identify", "hysteresis"]
+__all__ = ["__version__", "Lab", "Record", "Frf", "Analysis", "new", "frf", "identify", "modes", "hysteresis"]
 
 @final
 class Lab:
@@ -236,6 +236,7 @@ def identify(
     full_joint: bool = False,
     noise: float | None = None,
 ) -> tuple[Analysis, list[str]]: ...
+def modes(*, frf: Frf, band_hz: tuple[float, float] | None, frf_error: float) -> dict[str, Any]: ...
 def hysteresis(
     *,
     fs_hz: float,
