@@ -48,7 +48,9 @@ impl Frf {
     pub fn labelled(&self) -> LabelledFrf {
         let read = LabelledFrf::unlabelled(self.matrix.clone(), String::new(), Vec::new());
         match &self.labels {
-            Some((outputs, inputs)) => LabelledFrf { outputs: outputs.clone(), inputs: inputs.clone(), ..read },
+            Some((outputs, inputs)) => {
+                LabelledFrf { outputs: outputs.clone(), inputs: inputs.clone(), ..read }
+            }
             None => read,
         }
     }
