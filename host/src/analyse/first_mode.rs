@@ -1,10 +1,10 @@
 //! The lowest mode of the assembly over the campaign, from every hit that moves the contact: the
 //! check that nothing changed while it was hit.
 //!
-//! Each hit gives a frequency ([`follow`]) with its own interval. Frequencies of one place of impact
-//! share errors that do not depend on time (neighbouring modes, cut-off), so each cell is compared
-//! with the mean of its place of impact, as for the contact's drift; the scatter of the cells about a
-//! straight line over the hits gives the interval of the change.
+//! Each hit gives a frequency ([`follow`]) with its own interval. Frequencies of one place of
+//! impact share errors that do not depend on time (neighbouring modes, cut-off), so each cell is
+//! compared with the mean of its place of impact, as for the contact's drift; the scatter of the
+//! cells about a straight line over the hits gives the interval of the change.
 
 use super::cells_stage::HitAtContact;
 use super::modal::FoundModes;
@@ -36,10 +36,10 @@ const MOST: f64 = 0.5;
 /// Fewest cells of a place of impact: below, their scatter about a straight line is not known.
 const FEWEST_CELLS: usize = 4;
 
-/// The size of a change is told up to this fraction of the distance to the nearest other mode. The
-/// other modes are those of the averaged FRFs, held at their poles: a larger change blurs them, and
-/// then the size and even the sign found are wrong.
-const TOLD: f64 = 0.2;
+/// The size of a change is reported up to this fraction of the distance to the nearest other mode.
+/// The poles of the other modes are fixed at those of the averaged FRFs: a larger change smears
+/// these, and then the size and even the sign found are wrong.
+const REPORTED: f64 = 0.2;
 
 /// A change is certain beyond this many standard deviations.
 const CERTAIN: f64 = 4.0;
@@ -114,7 +114,7 @@ fn summary(
         mode_hz: mode.frequency_hz,
         hits_tried: hits,
         sessions: sessions(found, session),
-        change_hz: change.filter(|change| change.change_hz.abs() < TOLD * nearest_hz).map(|change| {
+        change_hz: change.filter(|change| change.change_hz.abs() < REPORTED * nearest_hz).map(|change| {
             Interval {
                 mean: change.change_hz,
                 ci95: [-1.0, 1.0].map(|sign| change.change_hz + sign * NORMAL_95 * change.std_hz),

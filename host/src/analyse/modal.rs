@@ -36,18 +36,18 @@ pub struct FoundModes {
     pub driving_points: usize,
     /// Outputs and inputs that are not used because some of their FRFs are missing.
     pub left_out: Vec<String>,
-    /// Why the variances of the FRFs are not used; then their error is `frf_error` alone, or, if that
-    /// is zero, estimated from the residuals.
+    /// Why the variances of the FRFs are not used; then their error is `frf_error` alone, or, if
+    /// that is zero, estimated from the residuals.
     pub without_variance: Option<String>,
 }
 
-/// Error of FRFs in addition to their noise, as a fraction of the FRFs' root mean square at the line
-/// and of the value: an aim that is off by 0.5 mm at a lever of 50 mm.
+/// Error of FRFs in addition to their noise, as a fraction of the FRFs' root mean square at the
+/// line and of the value: an aim that is off by 0.5 mm at a lever of 50 mm.
 pub const FRF_ERROR: f64 = 0.01;
 
 /// The band in which a campaign's modes are identified, Hz: lower lines contain the drift after the
-/// hammer's blow, and at higher ones arms of a real rig have many modes, of which errors of place and
-/// direction leave little certain.
+/// hammer's hit, and at higher ones arms of a real rig have many modes, which errors of place and
+/// direction make uncertain.
 pub const MODES_HZ: Band = Band { low_hz: 20.0, high_hz: 600.0 };
 
 /// Largest distance of the lines used of a campaign, Hz: the exponential window alone makes every

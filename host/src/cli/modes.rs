@@ -31,7 +31,7 @@ pub struct ModesArgs {
     /// Structures of a campaign [default: all that were measured].
     #[arg(long = "structure", value_name = "A|B|AJB", value_delimiter = ',', value_parser = structure)]
     structures: Vec<Structure>,
-    /// Band in Hz, ends included [default: 20:1000 for a campaign, all lines for FRFs]; modes
+    /// Band in Hz, ends included [default: 20:600 for a campaign, all lines for FRFs]; modes
     /// outside it are described by residual terms.
     #[arg(long, value_name = "LO:HI", value_parser = band)]
     band: Option<Band>,

@@ -4,9 +4,9 @@
 //! arrays make an FRF matrix, impact records or a hysteresis record. [`positions`] reads the pyFBS
 //! workbook, as xlsx or as a folder of csv tables. [`uff`] is the universal file; [`frf_uff`] and
 //! [`record_uff`] define which of its functions make FRFs or records; [`frf_file`] accepts either
-//! form. [`modes_output`] writes modes in both. [`units`] holds the only table of units, [`labelled_frf`] the only rule for signed
-//! directions; it and [`record_file`] hold what was read with both. A
-//! [`typed_table::Table`] is written as comma-separated text or, with the feature `parquet`, as
+//! form. [`modes_output`] writes modes in both. [`units`] holds the only table of units,
+//! [`labelled_frf`] the only rule for signed directions; it and [`record_file`] hold what was read
+//! with both. A [`typed_table::Table`] is written as comma-separated text or, with the feature `parquet`, as
 //! typed columns.
 //! `parquet`, columns for engines.
 

@@ -55,9 +55,9 @@ pub fn write_npz(path: &Path, modes: &Modes, points: &[OutputPoint], scaling: &s
 }
 
 /// Writes the modes as a universal file: header, units, nodes (data set 2411) where their positions
-/// are known, and one data set 55 for each mode, with the complex eigenvalue and the displacement of
-/// each node along x, y and z. A direction that was not measured is zero. Sensors are numbered from
-/// 1 in their order.
+/// are known, and one data set 55 for each mode, with the complex eigenvalue and the displacement
+/// of each node along x, y and z. A direction that was not measured is zero. Sensors are numbered
+/// from 1 in their order.
 ///
 /// # Errors
 /// An output has no direction, or the file cannot be written.

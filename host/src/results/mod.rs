@@ -6,8 +6,8 @@
 //! NaN. Every document contains its [`Source`]: file, record ids, settings, version.
 //!
 //! Here: the answer, the checks, the comparison of two campaigns and the provenance. `joint`: the
-//! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured; `modal`: the
-//! modes.
+//! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured; `modal`:
+//! the modes.
 
 use crate::campaign::store::SimulatedTruth;
 use crate::contact::{Contradiction, Diagnosis, Doubt, Interval, OfFrequency};

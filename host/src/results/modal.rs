@@ -117,8 +117,8 @@ pub struct FirstMode {
     pub mode_hz: f64,
     /// Hits that were tried; those without enough signal are not listed.
     pub hits_tried: usize,
-    /// Change of its frequency from the first hit to the last, Hz; null with too few cells, or if it
-    /// is too large against the distance to the nearest other mode to be told.
+    /// Change of its frequency from the first hit to the last, Hz; null with too few cells, or if
+    /// it is not small against the distance to the nearest other mode.
     pub change_hz: Option<Interval>,
     /// Whether it changed; null if that is not clear.
     pub drifts: Option<bool>,

@@ -325,7 +325,8 @@ fn apart(hits: &[&HitResponse], usual: &[&HitResponse], signal: usize, band: [f6
 /// little of it passes the contact.
 pub const LINES_HZ: [f64; 2] = [60.0, 700.0];
 
-/// Length of record used, from [`LEAD_S`] before the pulse's peak, s: slip shows in the first cycles, and noise accumulates after them.
+/// Length of record used, from [`LEAD_S`] before the pulse's peak, s: slip shows in the first
+/// cycles, and noise accumulates after them.
 pub const LENGTH_S: f64 = 0.3;
 
 /// Time kept before the pulse's peak, s.

@@ -34,8 +34,8 @@ pub struct Followed {
 }
 
 /// The mode near `start` (1/s) in the `outputs`, each with one value per line `s` of a record that
-/// ends `length_s` after the hit (infinite for one that ends at rest); `neighbours` are the poles of
-/// other modes in or near these lines. `None` if the lines do not determine it.
+/// ends `length_s` after the hit (infinite for one that ends at rest); `neighbours` are the poles
+/// of other modes in or near these lines. `None` if the lines do not determine it.
 pub fn follow(s: &[C], outputs: &[Vec<C>], length_s: f64, start: C, neighbours: &[C]) -> Option<Followed> {
     let unknowns = 3 + neighbours.len();
     // twice as many lines as unknowns, so that what is left of them is an estimate of the noise

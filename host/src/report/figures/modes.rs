@@ -138,8 +138,8 @@ pub fn first_mode(results: &Results) -> Option<Figure> {
     let records = found.hits.iter().map(|hit| hit.record as f64);
     let first = records.clone().fold(f64::INFINITY, f64::min);
     let last = records.fold(f64::NEG_INFINITY, f64::max);
-    let room = 0.02 * (last - first).max(1.0);
-    let x = Axis::linear("record, in the order of the hits", "", [first - room, last + room]);
+    let margin = 0.02 * (last - first).max(1.0);
+    let x = Axis::linear("record, in the order of the hits", "", [first - margin, last + margin]);
     let y = Axis::linear("natural frequency", "Hz", range);
     let points = found.hits.iter().map(|hit| [hit.record as f64, hit.frequency_hz]);
     let says = |hit: &HitFrequency| {
