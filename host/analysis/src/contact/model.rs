@@ -595,15 +595,17 @@ impl Normal {
     ) {
         let parameters = self.gradient.len();
         let mut seen = DMatrix::<Complex<f64>>::zeros(q.ncols(), parameters);
+        // columns lie together in memory, so that every inner loop runs along one
+        let conjugate = q.adjoint();
         for (r, row) in derivatives.iter().enumerate() {
             for (i, value) in row {
                 let value = value * weight[r];
                 self.gradient[*i] -= (value.conj() * residual[r]).re;
-                for (c, at) in seen.column_mut(*i).iter_mut().enumerate() {
-                    *at += q[(r, c)].conj() * value;
-                }
+                seen.column_mut(*i).axpy(value, &conjugate.column(r), Complex::from(1.0));
+                let value = value * weight[r];
+                let mut column = self.information.column_mut(*i);
                 for (j, other) in row {
-                    self.information[(*i, *j)] += (value.conj() * other).re * weight[r];
+                    column[*j] += value.re * other.re + value.im * other.im;
                 }
             }
         }

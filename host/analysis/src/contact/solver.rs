@@ -446,8 +446,9 @@ pub fn summed<'a>(
         let own = &blocks[block].parameters;
         for (i, to) in own.iter().enumerate() {
             gradient[*to] += weight * normal.gradient[i];
-            for (j, other) in own.iter().enumerate() {
-                information[(*to, *other)] += weight * normal.information[(i, j)];
+            let mut column = information.column_mut(*to);
+            for (other, value) in own.iter().zip(normal.information.column(i)) {
+                column[*other] += weight * value;
             }
         }
     }
