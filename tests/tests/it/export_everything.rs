@@ -19,7 +19,10 @@ fn table(path: &Path) -> Vec<Row> {
 
 #[test]
 fn every_channel_verdict_and_calibration_can_be_had() {
-    let (folder, file) = campaign(SMALL);
+    // short records, because exported tables are large
+    let short = SMALL.replace("length_s = 2.0", "length_s = 0.5");
+    assert_ne!(short, SMALL);
+    let (folder, file) = campaign(&short);
     done(jointrig().args(["campaign", "run", "--yes", "--device", "sim:"]).arg(&file));
     let rows: Vec<_> =
         Store::open_read_only(&file).unwrap().records().unwrap().into_iter().flatten().collect();

@@ -1,4 +1,4 @@
-"""Forty small campaigns of one contact on a cluster of two workers."""
+"""Sixteen small campaigns of one contact on a cluster of two workers."""
 
 import csv
 import os
@@ -13,7 +13,7 @@ import pytest
 from conftest import JOINTRIG, command
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
-CAMPAIGNS = 40
+CAMPAIGNS = 16
 # of the simulated rig, by its own file
 TRUTH = 180e6
 
@@ -56,8 +56,8 @@ def test_a_cluster_of_two_analyses_all_and_their_intervals_hold(campaigns: Path,
         rows = list(csv.DictReader(file))
     assert len(rows) == CAMPAIGNS and len({row["worker"] for row in rows}) == 2
     covered = sum(float(row["ci95_low"]) <= TRUTH <= float(row["ci95_high"]) for row in rows)
-    # of forty 95 % intervals, 33 or fewer hold the truth once in a thousand times
-    assert covered >= 34, rows
+    # of sixteen 95 % intervals, 11 or fewer hold the truth once in a thousand times
+    assert covered >= 12, rows
     assert (tmp_path / "funnel.png").stat().st_size > 10_000
     # one of them by the command, which any other scheduler would call
     told = subprocess.run(
