@@ -19,6 +19,9 @@ use num_complex::Complex;
 
 /// Largest number of steps.
 const STEPS: usize = 60;
+/// The same before the noise is widened by the residuals: outlying cells, with too much weight, can
+/// keep that search from converging, and its end is only where the next one begins.
+const FIRST_STEPS: usize = 8;
 /// Convergence: the step changes the compliance by less than this fraction of its standard
 /// deviation, and all parameters together lower the cost by less than this. The first condition
 /// alone can hold by chance while others, which the compliance follows later, are many standard
@@ -138,22 +141,25 @@ fn search(
         searched.hold(*at, *value);
         p[*at] = *value;
     }
-    let settle = |blocks: &[Block], parameters: &Parameters, p: Vec<f64>| {
-        Posterior { blocks, parameters, shared }.settle(p)
+    let settle = |blocks: &[Block], parameters: &Parameters, p: Vec<f64>, motion: Motion, steps: usize| {
+        Posterior { blocks, parameters, shared }.settle(p, motion, steps)
     };
-    let (mut here, mut settled) = settle(&blocks, &searched, p)?;
+    let motion = motions(&blocks, &evaluate(&blocks, &p, None)?);
+    let (mut here, mut settled) = settle(&blocks, &searched, p, motion, FIRST_STEPS)?;
     if start.released {
         searched = parameters.clone();
-        (here, settled) = settle(&blocks, &searched, here.p)?;
+        let motion = motions(&blocks, &here.bins);
+        (here, settled) = settle(&blocks, &searched, here.p, motion, FIRST_STEPS)?;
     }
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
             .collect();
-        if !widen(&mut blocks, &left) {
+        if !widen(&mut blocks, &left) && settled {
             break;
         }
-        (here, settled) = settle(&blocks, &searched, here.p)?;
+        let motion = motions(&blocks, &here.bins);
+        (here, settled) = settle(&blocks, &searched, here.p, motion, STEPS)?;
     }
     if !settled {
         return Err(not_converged());
@@ -186,23 +192,30 @@ pub fn settled_from(
     p: Vec<f64>,
 ) -> Result<(Vec<f64>, bool), ContactError> {
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
-    Posterior { blocks, parameters, shared }.settle(p).map(|(place, settled)| (place.p, settled))
+    let motion = motions(blocks, &evaluate(blocks, &p, None)?);
+    Posterior { blocks, parameters, shared }
+        .settle(p, motion, STEPS)
+        .map(|(place, settled)| (place.p, settled))
 }
 
 impl Posterior<'_> {
-    /// Steps from `p` to the nearest minimum; the flag states whether it converged. The shifts'
-    /// motion is that of the last accepted point, so the cost of a point is not computed with the
-    /// motion of the next. If a step seems to increase the cost, the current point is therefore
-    /// evaluated again with the new motion. Before the noise is widened, outlying cells can prevent
-    /// convergence.
-    fn settle(&self, p: Vec<f64>) -> Result<(SearchPoint, bool), ContactError> {
-        let mut motion = motions(self.blocks, &evaluate(self.blocks, &p, None)?);
+    /// At most so many steps from `p` to the nearest minimum, with `motion` as that at `p` or near
+    /// it; the flag states whether it converged.
+    /// The shifts' motion is that of the last accepted point, so the cost of a point is not
+    /// computed with the motion of the next. If a step seems to increase the cost, the current
+    /// point is therefore evaluated again with the new motion.
+    fn settle(
+        &self,
+        p: Vec<f64>,
+        mut motion: Motion,
+        steps: usize,
+    ) -> Result<(SearchPoint, bool), ContactError> {
         let mut here = self.place(p, &motion)?;
         motion = motions(self.blocks, &here.bins);
         let mut stale = true;
         let mut damping = 1e-9;
         let mut at_rest = 0;
-        for _ in 0..STEPS {
+        for _ in 0..steps {
             let (information, gradient) = self.normal(&here);
             let (step, sigma) = newton(&information, &gradient, damping)?;
             if damping <= HARDLY_DAMPED && step[COMPLIANCE].abs() <= SETTLED * sigma {
