@@ -19,9 +19,12 @@ use num_complex::Complex;
 
 /// Largest number of steps.
 const STEPS: usize = 60;
-/// The same before the noise is widened by the residuals: outlying cells, with too much weight, can
-/// keep that search from converging, and its end is only where the next one begins.
-const FIRST_STEPS: usize = 8;
+/// Before the noise is widened by the residuals, outlying cells, with too much weight, can keep the
+/// search from converging. It then ends where [`FEW`] steps lower the cost by less than this
+/// fraction. Widening the noise earlier would take for noise what the parameters can still explain.
+const SLOW: f64 = 0.01;
+/// Steps over which [`SLOW`] is judged.
+const FEW: usize = 5;
 /// Convergence: the step changes the compliance by less than this fraction of its standard
 /// deviation, and all parameters together lower the cost by less than this. The first condition
 /// alone can hold by chance while others, which the compliance follows later, are many standard
@@ -141,15 +144,16 @@ fn search(
         searched.hold(*at, *value);
         p[*at] = *value;
     }
-    let settle = |blocks: &[Block], parameters: &Parameters, p: Vec<f64>, motion: Motion, steps: usize| {
-        Posterior { blocks, parameters, shared }.settle(p, motion, steps)
-    };
+    let settle =
+        |blocks: &[Block], parameters: &Parameters, p: Vec<f64>, motion: Motion, slow: Option<f64>| {
+            Posterior { blocks, parameters, shared }.settle(p, motion, slow)
+        };
     let motion = motions(&blocks, &evaluate(&blocks, &p, None)?);
-    let (mut here, mut settled) = settle(&blocks, &searched, p, motion, FIRST_STEPS)?;
+    let (mut here, mut settled) = settle(&blocks, &searched, p, motion, Some(SLOW))?;
     if start.released {
         searched = parameters.clone();
         let motion = motions(&blocks, &here.bins);
-        (here, settled) = settle(&blocks, &searched, here.p, motion, FIRST_STEPS)?;
+        (here, settled) = settle(&blocks, &searched, here.p, motion, Some(SLOW))?;
     }
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
@@ -159,7 +163,7 @@ fn search(
             break;
         }
         let motion = motions(&blocks, &here.bins);
-        (here, settled) = settle(&blocks, &searched, here.p, motion, STEPS)?;
+        (here, settled) = settle(&blocks, &searched, here.p, motion, None)?;
     }
     if !settled {
         return Err(not_converged());
@@ -194,13 +198,14 @@ pub fn settled_from(
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
     let motion = motions(blocks, &evaluate(blocks, &p, None)?);
     Posterior { blocks, parameters, shared }
-        .settle(p, motion, STEPS)
+        .settle(p, motion, None)
         .map(|(place, settled)| (place.p, settled))
 }
 
 impl Posterior<'_> {
-    /// At most so many steps from `p` to the nearest minimum, with `motion` as that at `p` or near
-    /// it; the flag states whether it converged.
+    /// Steps from `p` to the nearest minimum, with `motion` as that at `p` or near it; the flag
+    /// states whether it converged. With `slow`, it ends where [`FEW`] steps lower the cost by less
+    /// than this fraction.
     /// The shifts' motion is that of the last accepted point, so the cost of a point is not
     /// computed with the motion of the next. If a step seems to increase the cost, the current
     /// point is therefore evaluated again with the new motion.
@@ -208,14 +213,20 @@ impl Posterior<'_> {
         &self,
         p: Vec<f64>,
         mut motion: Motion,
-        steps: usize,
+        slow: Option<f64>,
     ) -> Result<(SearchPoint, bool), ContactError> {
         let mut here = self.place(p, &motion)?;
         motion = motions(self.blocks, &here.bins);
         let mut stale = true;
         let mut damping = 1e-9;
         let mut at_rest = 0;
-        for _ in 0..steps {
+        let mut costs = Vec::new();
+        for step in 0..STEPS {
+            costs.push(here.cost);
+            let before = step.checked_sub(FEW).map(|before| costs[before]);
+            if slow.zip(before).is_some_and(|(slow, before)| here.cost > before * (1.0 - slow)) {
+                break;
+            }
             let (information, gradient) = self.normal(&here);
             let (step, sigma) = newton(&information, &gradient, damping)?;
             if damping <= HARDLY_DAMPED && step[COMPLIANCE].abs() <= SETTLED * sigma {
