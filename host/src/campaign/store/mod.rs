@@ -427,7 +427,7 @@ impl Identity {
     }
 }
 
-/// Device and inode, by which a system tells files apart whatever their names.
+/// Device and inode, which tell files apart whatever their names.
 ///
 /// # Errors
 /// There is no such file.
@@ -438,15 +438,14 @@ fn number(path: &Path) -> std::io::Result<Option<(u64, u64)>> {
     Ok(Some((file.dev(), file.ino())))
 }
 
-/// The volume's serial number and the file's index on it. An open file can be neither removed nor
-/// replaced there, but its drive can be pulled out, and another one get the same letter.
+/// On Windows an open file can be neither removed nor replaced. If its drive is pulled out, and
+/// another one gets the same letter, writing to the open file fails.
 ///
 /// # Errors
 /// There is no such file.
 #[cfg(windows)]
 fn number(path: &Path) -> std::io::Result<Option<(u64, u64)>> {
-    let file = winapi_util::file::information(File::open(path)?)?;
-    Ok(Some((file.volume_serial_number(), file.file_index())))
+    std::fs::metadata(path).map(|_| None)
 }
 
 /// Number of attempts if the lock file disappears while it is being locked, or (on Windows) may be
@@ -457,10 +456,8 @@ const TRIES: usize = 10;
 enum Claim {
     /// Locked.
     Held(File),
-    /// Locked by this process.
-    Taken(String),
-    /// The lock file was removed, or may be free in a moment.
-    Again,
+    /// Locked by this process; whether it may be free in a moment, or the lock file is gone.
+    Busy { holder: String, again: bool },
 }
 
 /// The lock; released when dropped.
@@ -489,10 +486,11 @@ impl WriteLock {
         for _ in 0..TRIES {
             let mut file = match claimed(&path).map_err(failed)? {
                 Claim::Held(file) => file,
-                Claim::Taken(by) => return Err(StoreError::Busy { path: campaign.into(), holder: by }),
-                Claim::Again => {
-                    // optional: the holder only improves the message
-                    holder = std::fs::read_to_string(&path).unwrap_or_default().trim().into();
+                Claim::Busy { holder, again: false } => {
+                    return Err(StoreError::Busy { path: campaign.into(), holder });
+                }
+                Claim::Busy { holder: now, again: true } => {
+                    holder = now;
                     continue;
                 }
             };
@@ -518,13 +516,13 @@ fn claimed(path: &Path) -> std::io::Result<Claim> {
     let mut file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
     match file.try_lock() {
         // its previous holder may have removed it after we opened and before we locked it
-        Ok(()) if !still_there(&file, path) => Ok(Claim::Again),
+        Ok(()) if !still_there(&file, path) => Ok(Claim::Busy { holder: String::new(), again: true }),
         Ok(()) => Ok(Claim::Held(file)),
         Err(TryLockError::WouldBlock) => {
             let mut holder = String::new();
             // optional: the holder only improves the message
             let _ = file.read_to_string(&mut holder);
-            Ok(Claim::Taken(holder.trim().into()))
+            Ok(Claim::Busy { holder: holder.trim().into(), again: false })
         }
         Err(TryLockError::Error(source)) => Err(source),
     }
@@ -545,7 +543,9 @@ fn claimed(path: &Path) -> std::io::Result<Claim> {
         Err(error) if error.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => {
             // a virus scanner opens new files for a moment
             std::thread::sleep(Duration::from_millis(20));
-            Ok(Claim::Again)
+            // optional: the holder only improves the message
+            let holder = std::fs::read_to_string(path).unwrap_or_default();
+            Ok(Claim::Busy { holder: holder.trim().into(), again: true })
         }
         Err(error) => Err(error),
     }
