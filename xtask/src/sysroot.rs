@@ -316,7 +316,7 @@ fn copy_all_libraries(from: &Path, to: &Path) -> Result<()> {
     let entries = fs::read_dir(from).with_context(|| format!("could not list {}", from.display()))?;
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        if name.ends_with(".rlib") && !name.starts_with("libsysroot") {
+        if path.extension().is_some_and(|ending| ending == "rlib") && !name.starts_with("libsysroot") {
             fs::copy(&path, to.join(name)).with_context(|| format!("could not copy {}", path.display()))?;
         }
     }

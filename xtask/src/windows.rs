@@ -34,7 +34,7 @@ const TESTED: [&str; 4] = ["jointrig", "jointrig-analysis", "jointrig-protocol",
 /// it computes does not depend on that, and the loops over samples are in other packages.
 const QUICKLY: &str = "profile.release.package.jointrig.opt-level=0";
 /// How long a measuring program may take to start, and to end after it was asked to.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A library that Wine 8 lacks and every Rust program needs: random numbers.
 const RANDOM: &str = "\
@@ -109,6 +109,9 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     let since = Instant::now();
     let work = folder.join("campaigns");
     fresh(&work)?;
+    for folder in FOLDERS {
+        fresh(&work.join(folder))?;
+    }
     let both = Both { project, linux: &linux, windows: &windows.jointrig, wine: &wine, work: &work };
     let compared = both.campaign()?;
     timed(&format!("campaign, analysis and export: {compared}"), since);
@@ -123,7 +126,9 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     }
     fs::remove_dir_all(&work).with_context(|| format!("could not remove {}", work.display()))?;
     println!("\n  Windows, in Wine:");
-    said.iter().for_each(|line| println!("  - {line}"));
+    for line in &said {
+        println!("  - {line}");
+    }
     Ok(())
 }
 
@@ -243,35 +248,33 @@ enum Build {
     Windows,
 }
 
+/// The folder of each build.
+const FOLDERS: [&str; 2] = ["linux", "windows"];
+
 impl Both<'_> {
-    /// `jointrig`, in a folder of this build's own.
-    fn jointrig(&self, build: Build, arguments: &[&str]) -> Result<Command> {
-        let folder = self.folder(build);
-        fs::create_dir_all(&folder).with_context(|| format!("could not create {}", folder.display()))?;
+    /// `jointrig`, in its folder.
+    fn jointrig(&self, build: Build, arguments: &[&str]) -> Command {
         let mut command = match build {
             Build::Linux => command::without_own_package(self.linux),
             Build::Windows => self.wine.command(self.windows),
         };
-        command.args(arguments).current_dir(folder).stdin(Stdio::null());
-        Ok(command)
+        command.args(arguments).current_dir(self.folder(build)).stdin(Stdio::null());
+        command
     }
 
     fn folder(&self, build: Build) -> PathBuf {
-        self.work.join(match build {
-            Build::Linux => "linux",
-            Build::Windows => "windows",
-        })
+        self.work.join(FOLDERS[build as usize])
     }
 
     fn run(&self, build: Build, arguments: &[&str]) -> Result<String> {
-        let mut command = self.jointrig(build, arguments)?;
+        let mut command = self.jointrig(build, arguments);
         println!("  $ {} ({build:?})", command::line(&command));
         command::output(&mut command)
     }
 
     /// Runs a command that must be refused, and returns its message.
     fn refused(&self, arguments: &[&str]) -> Result<String> {
-        let mut command = self.jointrig(Build::Windows, arguments)?;
+        let mut command = self.jointrig(Build::Windows, arguments);
         println!("  $ {} (must be refused)", command::line(&command));
         let output = command.output().context("Wine could not be started")?;
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -280,10 +283,9 @@ impl Both<'_> {
     }
 
     /// Creates a campaign with a plan of docs/plans.
-    fn new(&self, build: Build, file: &str, plan: &str) -> Result<()> {
+    fn make(&self, build: Build, file: &str, plan: &str) -> Result<()> {
         let text = fs::read_to_string(self.project.root.join("docs/plans").join(plan))
             .with_context(|| format!("could not read the plan {plan}"))?;
-        self.run(build, &["--version"])?;
         let copy = self.folder(build).join(plan);
         fs::write(&copy, text).with_context(|| format!("could not write {}", copy.display()))?;
         self.run(build, &["campaign", "new", file, "--plan", plan]).map(drop)
@@ -293,7 +295,7 @@ impl Both<'_> {
     fn campaign(&self) -> Result<String> {
         let file = "Prüfung Пётр 1.jrig";
         for build in [Build::Linux, Build::Windows] {
-            self.new(build, file, "small.toml")?;
+            self.make(build, file, "small.toml")?;
             self.run(build, &MEASURE.map(|word| if word == FILE { file } else { word }))?;
             self.run(build, &["campaign", "verify", file])?;
             self.run(build, &["export", file, "--all", "--format", "npz", "--out", "export"])?;
@@ -339,7 +341,7 @@ impl Both<'_> {
         let plan = "small.toml";
         for file in [
             format!(r"{share}\new.jrig"),
-            format!(r"\\?\UNC\server\lab\new.jrig"),
+            r"\\?\UNC\server\lab\new.jrig".into(),
             "//server/lab/new.jrig".into(),
         ] {
             let said = self.refused(&["campaign", "new", &file, "--plan", plan])?;
@@ -352,7 +354,7 @@ impl Both<'_> {
         self.run(Build::Windows, &["campaign", "verify", &there])?;
 
         let file = "busy.jrig";
-        self.new(Build::Windows, file, "demo.toml")?;
+        self.make(Build::Windows, file, "demo.toml")?;
         let writer = self.writer(file)?;
         let said = self.refused(&["campaign", "run", file, "--device", "sim:"])?;
         ensure!(
@@ -367,7 +369,7 @@ impl Both<'_> {
     /// Starts measuring in Wine, and waits until records arrive.
     fn writer(&self, file: &str) -> Result<Writer> {
         let arguments = MEASURE.map(|word| if word == FILE { file } else { word });
-        let mut command = self.jointrig(Build::Windows, &arguments)?;
+        let mut command = self.jointrig(Build::Windows, &arguments);
         let errors = self.folder(Build::Windows).join("stderr");
         let to =
             fs::File::create(&errors).with_context(|| format!("could not create {}", errors.display()))?;
