@@ -61,6 +61,9 @@ pub struct Options {
     /// of disk.
     #[arg(long)]
     demo: bool,
+    /// Leave out the library tests, which take longest to build.
+    #[arg(long)]
+    without_tests: bool,
     /// Only build.
     #[arg(long, conflicts_with = "demo")]
     build_only: bool,
@@ -85,7 +88,8 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     timed("tools and sysroot", begun);
 
     let since = Instant::now();
-    let windows = Programs::for_windows(project, &sysroot, &folder)?;
+    let tested: &[&str] = if options.without_tests { &[] } else { &TESTED };
+    let windows = Programs::for_windows(project, &sysroot, &folder, tested)?;
     timed("built for Windows", since);
     if options.build_only {
         println!("  {}", windows.jointrig.display());
@@ -102,9 +106,11 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     timed("built for this system", since);
 
     let wine = Wine::prepare(&folder)?;
-    let since = Instant::now();
-    let counts = windows.tests(&wine)?;
-    timed(&format!("library tests in Wine: {counts}"), since);
+    if !options.without_tests {
+        let since = Instant::now();
+        let counts = windows.tests(&wine)?;
+        timed(&format!("library tests in Wine: {counts}"), since);
+    }
 
     let since = Instant::now();
     let work = folder.join("campaigns");
@@ -139,7 +145,7 @@ struct Programs {
 }
 
 impl Programs {
-    fn for_windows(project: &Project, sysroot: &Path, folder: &Path) -> Result<Self> {
+    fn for_windows(project: &Project, sysroot: &Path, folder: &Path, tested: &[&str]) -> Result<Self> {
         let cargo = || {
             let mut cargo = command::cargo(&project.root);
             let target = sysroot::variable_form(WINDOWS);
@@ -160,17 +166,18 @@ impl Programs {
             "jointrig",
         ]))
         .context("the host does not compile for Windows")?;
-        let mut tests = cargo();
-        tests.args(["test", "--no-run", "--lib", "--message-format=json-render-diagnostics"]).args(selected);
-        tests.args(TESTED.iter().flat_map(|package| ["--package", package]));
-        println!("  $ {}", command::line(&tests));
-        let tests = tests_run::programs(&command::output(&mut tests)?)?;
-        ensure!(
-            tests.len() == TESTED.len(),
-            "expected {} test programs, found {}",
-            TESTED.len(),
-            tests.len()
-        );
+        let mut tests = Vec::new();
+        if !tested.is_empty() {
+            let mut build = cargo();
+            build
+                .args(["test", "--no-run", "--lib", "--message-format=json-render-diagnostics"])
+                .args(selected);
+            build.args(tested.iter().flat_map(|package| ["--package", package]));
+            println!("  $ {}", command::line(&build));
+            tests = tests_run::programs(&command::output(&mut build)?)?;
+        }
+        let (wanted, found) = (tested.len(), tests.len());
+        ensure!(found == wanted, "expected {wanted} test programs, found {found}");
         let jointrig = folder.join(WINDOWS).join("release/jointrig.exe");
         ensure!(jointrig.is_file(), "jointrig.exe was built, but is not at {}", jointrig.display());
         Ok(Self { jointrig, tests })
