@@ -61,15 +61,21 @@ pub struct Options {
     /// of disk.
     #[arg(long)]
     demo: bool,
-    /// Leave out the library tests, which take longest to build.
+    /// Leave out the other parts.
     #[arg(long)]
-    without_tests: bool,
-    /// Only build.
-    #[arg(long, conflicts_with = "demo")]
-    build_only: bool,
+    only: Option<Only>,
     /// Compare with this `jointrig` of the same sources, instead of building one for this system.
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
+}
+
+/// A part of the work.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Only {
+    /// Build `jointrig.exe`, and print its path.
+    Build,
+    /// Measure and compare, without the library tests, which take longest to build.
+    Campaigns,
 }
 
 /// Builds, tests and compares; prints a summary.
@@ -88,10 +94,10 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     timed("tools and sysroot", begun);
 
     let since = Instant::now();
-    let tested: &[&str] = if options.without_tests { &[] } else { &TESTED };
+    let tested: &[&str] = if options.only.is_some() { &[] } else { &TESTED };
     let windows = Programs::for_windows(project, &sysroot, &folder, tested)?;
     timed("built for Windows", since);
-    if options.build_only {
+    if options.only == Some(Only::Build) {
         println!("  {}", windows.jointrig.display());
         return Ok(());
     }
@@ -106,7 +112,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     timed("built for this system", since);
 
     let wine = Wine::prepare(&folder)?;
-    if !options.without_tests {
+    if options.only.is_none() {
         let since = Instant::now();
         let counts = windows.tests(&wine)?;
         timed(&format!("library tests in Wine: {counts}"), since);
