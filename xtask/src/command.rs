@@ -99,6 +99,26 @@ pub fn is_executable(path: &Path) -> bool {
     metadata.is_file()
 }
 
+/// Makes a script executable.
+pub fn make_executable(path: &Path) -> Result<()> {
+    #[cfg(unix)]
+    std::fs::set_permissions(path, std::os::unix::fs::PermissionsExt::from_mode(0o755))
+        .with_context(|| format!("could not make {} executable", path.display()))?;
+    #[cfg(not(unix))]
+    bail!("{} is a shell script, which this system cannot run", path.display());
+    #[cfg(unix)]
+    Ok(())
+}
+
+/// Makes the symbolic link `at`, which leads to `to`.
+pub fn symlink(to: &Path, at: &Path) -> Result<()> {
+    #[cfg(unix)]
+    let made = std::os::unix::fs::symlink(to, at);
+    #[cfg(not(unix))]
+    let made = Err(std::io::Error::from(std::io::ErrorKind::Unsupported));
+    made.with_context(|| format!("could not link {} to {}", at.display(), to.display()))
+}
+
 fn place(command: &Command) -> String {
     command.get_current_dir().map(|directory| format!(" in {}", directory.display())).unwrap_or_default()
 }

@@ -23,6 +23,7 @@ mod size;
 mod suite;
 mod sysroot;
 mod tests_run;
+mod windows;
 
 use clap::{Parser, Subcommand};
 use project::Project;
@@ -63,6 +64,9 @@ enum Task {
     /// Run all checks that must pass before a change is merged.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Test(suite::Options),
+    /// Build the host for Windows with the distribution's compilers, and run its library tests and
+    /// campaigns in Wine, compared with this system's (Debian).
+    Windows(windows::Options),
     /// Run the emulated board in QEMU.
     Qemu(emulator::Options),
     /// Count the firmware's instructions and memory in the emulator, write the table, and enforce
@@ -133,6 +137,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Lint => lint::all(&project),
         Task::Layout => layout::check(&project),
         Task::Test(options) => suite::run(&project, &options),
+        Task::Windows(options) => windows::run(&project, &options),
         Task::Qemu(options) => emulator::run(&project, &options),
         Task::Budgets => budgets::command(&project),
         Task::Flash { detach } => firmware::flash(&project, detach),

@@ -8,6 +8,7 @@
 
 use crate::packages::Consent;
 use crate::project::{Project, TARGET};
+use crate::sysroot::Sysroot;
 use crate::{command, packages, sysroot};
 use anyhow::{Context, Result, bail};
 use std::ffi::OsString;
@@ -206,7 +207,7 @@ fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<
                 "  {TARGET}: not in the compiler cargo uses, but a private sysroot from an earlier set-up is there; \
                  {MODE_VARIABLE}=rustup would add it to rustup's instead"
             );
-            sysroot::ensure(project, consent).map(|sysroot| Toolchain::Private { sysroot })
+            sysroot::ensure(project, Sysroot::Firmware, consent).map(|sysroot| Toolchain::Private { sysroot })
         }
         Way::RustupAdd => {
             println!("  {TARGET}: not installed; rustup adds its ready-made core (about 10 MB to download)");
@@ -227,7 +228,7 @@ fn attempt(way: Way, project: &Project, mode: Mode, consent: Consent) -> Result<
             println!(
                 "  {TARGET}: from the distribution's compiler and sources, {why} ({MODE_VARIABLE} chooses)"
             );
-            sysroot::ensure(project, consent).map(|sysroot| Toolchain::Private { sysroot })
+            sysroot::ensure(project, Sysroot::Firmware, consent).map(|sysroot| Toolchain::Private { sysroot })
         }
     }
 }

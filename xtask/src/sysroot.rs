@@ -1,24 +1,24 @@
-//! The private sysroot: the target's `core` and `alloc`, built once from the distribution's
-//! sources.
+//! Private sysroots: a target's libraries, built once from the distribution's sources.
 //!
 //! Debian's `rustc-web` is a current compiler and `rust-web-src` its library sources
-//! (`rust-web-clippy` is its clippy); none includes the microcontroller's target precompiled. This
-//! module builds `core`, `alloc` and `compiler_builtins` into a folder next to the other build
-//! products, with the layout of a sysroot, and a two-line wrapper that makes rustc use it. After
-//! that plain `cargo build` with `RUSTC` set to the wrapper is enough. A compiler only reads
-//! libraries of its own version, so the folder's name contains the version.
+//! (`rust-web-clippy` is its clippy); none includes another target precompiled. This module builds
+//! `core`, `alloc` and `compiler_builtins` for the microcontroller, or `std` and `test` for
+//! Windows, into a folder next to the other build products, with the layout of a sysroot, and a
+//! two-line wrapper that makes rustc use it. After that plain `cargo build` with `RUSTC` set to the
+//! wrapper is enough. A compiler only reads libraries of its own version, so the folder's name
+//! contains the version.
 //!
-//! It takes about 40 s once. The work is done in a `.partial` folder under a file lock, and renamed
+//! It takes about 40 s once for the microcontroller, two minutes for Windows. The work is done in a `.partial` folder under a file lock, and renamed
 //! when complete: a folder with the final name is always complete, even after an interruption.
 
 use crate::command;
+use crate::command::{make_executable, symlink};
 use crate::packages;
 use crate::packages::Consent;
 use crate::project::{Project, TARGET};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -30,6 +30,61 @@ pub const CLIPPY: &str = "/usr/bin/clippy-driver";
 const PACKAGES: [&str; 3] = ["rustc-web", "rust-web-src", "rust-web-clippy"];
 /// The libraries a `no_std` program with an allocator needs.
 const LIBRARIES: [&str; 3] = ["core", "alloc", "compiler_builtins"];
+/// 64-bit Windows with the GNU tools, which Debian has as a cross compiler.
+pub const WINDOWS: &str = "x86_64-pc-windows-gnu";
+
+/// What a sysroot is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sysroot {
+    /// The microcontroller.
+    Firmware,
+    /// Windows.
+    Windows,
+}
+
+impl Sysroot {
+    fn target(self) -> &'static str {
+        match self {
+            Self::Firmware => TARGET,
+            Self::Windows => WINDOWS,
+        }
+    }
+
+    /// Beginning of its folder's name, and the name of its lock.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Firmware => "firmware-sysroot",
+            Self::Windows => "windows-sysroot",
+        }
+    }
+
+    /// The crates that cargo builds.
+    fn crates(self) -> &'static str {
+        match self {
+            Self::Firmware => "core,alloc",
+            Self::Windows => "std,panic_unwind,proc_macro,test",
+        }
+    }
+
+    /// Library that exists only in a complete sysroot.
+    fn last(self) -> &'static str {
+        match self {
+            Self::Firmware => "core",
+            Self::Windows => "test",
+        }
+    }
+
+    fn duration(self) -> &'static str {
+        match self {
+            Self::Firmware => "about 40 s",
+            Self::Windows => "about two minutes",
+        }
+    }
+
+    fn libraries(self, folder: &Path) -> PathBuf {
+        folder.join("lib/rustlib").join(self.target()).join("lib")
+    }
+}
 /// Environment variables of the caller that must not affect the build of `core`.
 const FOREIGN: [&str; 7] = [
     "RUSTFLAGS",
@@ -75,23 +130,25 @@ impl Distribution {
     }
 
     /// The folder of the sysroot that fits this compiler.
-    fn folder(&self, project: &Project) -> Result<PathBuf> {
+    fn folder(&self, project: &Project, sysroot: Sysroot) -> Result<PathBuf> {
         let mut hasher = DefaultHasher::new();
         self.version.hash(&mut hasher);
         let (release, hash) = (self.field("release")?, hasher.finish() as u32);
-        Ok(project.target.join(format!("firmware-sysroot-{TARGET}-{release}-{hash:08x}")))
+        let (name, target) = (sysroot.name(), sysroot.target());
+        Ok(project.target.join(format!("{name}-{target}-{release}-{hash:08x}")))
     }
 }
 
-/// A finished sysroot that fits the installed compiler; does not install or build anything.
+/// The microcontroller's finished sysroot that fits the installed compiler; does not install or
+/// build anything.
 pub fn existing(project: &Project) -> Result<Option<PathBuf>> {
     let Some(distribution) = Distribution::find()? else { return Ok(None) };
-    let folder = distribution.folder(project)?;
-    Ok(is_whole(&folder).then_some(folder))
+    let folder = distribution.folder(project, Sysroot::Firmware)?;
+    Ok(is_whole(&folder, Sysroot::Firmware).then_some(folder))
 }
 
 /// Installs what is missing, builds the sysroot if there is none, and returns the sysroot.
-pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
+pub fn ensure(project: &Project, sysroot: Sysroot, consent: Consent) -> Result<PathBuf> {
     let distribution = if let Some(found) = Distribution::find()? {
         found
     } else {
@@ -106,46 +163,56 @@ pub fn ensure(project: &Project, consent: Consent) -> Result<PathBuf> {
             )
         })?
     };
-    let linker = if let Some(linker) = find_linker(&distribution)? {
-        linker
-    } else {
-        println!(
-            "  installing lld: the target is linked by LLVM's linker, and neither rustup nor the system has it"
-        );
-        packages::install(&["lld"], consent).context("no linker for the target")?;
-        find_linker(&distribution)?
-            .context("lld is installed, but there is no /usr/bin/ld.lld: reinstall it")?
-    };
-    let folder = distribution.folder(project)?;
+    let folder = distribution.folder(project, sysroot)?;
     fs::create_dir_all(&project.target)
         .with_context(|| format!("could not create {}", project.target.display()))?;
-    let lock_path = project.target.join("firmware-sysroot.lock");
+    let lock_path = project.target.join(format!("{}.lock", sysroot.name()));
     let lock =
         fs::File::create(&lock_path).with_context(|| format!("could not create {}", lock_path.display()))?;
     if lock.try_lock().is_err() {
         println!("  another set-up is at work on the sysroot: waiting for it");
     }
     lock.lock().with_context(|| format!("could not lock {}", lock_path.display()))?;
-    if is_whole(&folder) {
+    if is_whole(&folder, sysroot) {
         println!("  sysroot: {}", folder.display());
     } else {
         println!(
-            "  building core and alloc for {TARGET} with {RUSTC} {} (about 40 s)",
-            distribution.field("release")?
+            "  building {} for {} with {RUSTC} {} ({})",
+            sysroot.crates(),
+            sysroot.target(),
+            distribution.field("release")?,
+            sysroot.duration()
         );
-        complete(&folder, |partial| build(&distribution, partial, &folder)).with_context(|| {
+        complete(&folder, |partial| build(&distribution, sysroot, partial, &folder)).with_context(|| {
             format!("the sysroot could not be built; nothing was left in {}", folder.display())
         })?;
         println!("  sysroot: {} is complete", folder.display());
     }
-    // The linker may have moved since (a removed toolchain): the link is recreated if it is
-    // dangling.
-    let link = linker_link(&folder, &distribution)?;
-    if !command::is_executable(&link) {
-        let _ = fs::remove_file(&link);
-        symlink(&linker, &link).with_context(|| format!("could not link {}", link.display()))?;
+    if sysroot == Sysroot::Firmware {
+        link_linker(&distribution, &folder, consent)?;
     }
     Ok(folder)
+}
+
+/// Puts LLVM's linker into the microcontroller's sysroot. It may have moved since (a removed
+/// toolchain): a dangling link is recreated. Windows is linked by a C compiler instead.
+fn link_linker(distribution: &Distribution, folder: &Path, consent: Consent) -> Result<()> {
+    let linker = if let Some(linker) = find_linker(distribution)? {
+        linker
+    } else {
+        println!(
+            "  installing lld: the target is linked by LLVM's linker, and neither rustup nor the system has it"
+        );
+        packages::install(&["lld"], consent).context("no linker for the target")?;
+        find_linker(distribution)?
+            .context("lld is installed, but there is no /usr/bin/ld.lld: reinstall it")?
+    };
+    let link = linker_link(folder, distribution)?;
+    if !command::is_executable(&link) {
+        let _ = fs::remove_file(&link);
+        symlink(&linker, &link)?;
+    }
+    Ok(())
 }
 
 /// Calls `work` to fill a `.partial` folder and renames it to `folder` on success: `folder` is
@@ -171,7 +238,8 @@ fn complete(folder: &Path, work: impl FnOnce(&Path) -> Result<()>) -> Result<()>
 
 /// Builds the sysroot in `partial`; the wrapper it writes already contains `folder`, the final
 /// path.
-fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<()> {
+fn build(distribution: &Distribution, sysroot: Sysroot, partial: &Path, folder: &Path) -> Result<()> {
+    let target = sysroot.target();
     let package = partial.join("build");
     write(&package.join("src/lib.rs"), "#![no_std]\n")?;
     write(
@@ -190,16 +258,27 @@ fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<(
         // Debian's source package has no lock file where cargo looks for it; this variable sets the
         // folder explicitly.
         .env("__CARGO_TESTS_ONLY_SRC_ROOT", distribution.sources())
-        // With bitcode in the libraries, link-time optimisation reaches into core.
-        .env(format!("CARGO_TARGET_{}_RUSTFLAGS", variable_form(TARGET)), "-Cembed-bitcode=yes")
-        .args(["build", "--release", "-Zbuild-std=core,alloc", "--target", TARGET])
+        .args(["build", "--release", &format!("-Zbuild-std={}", sysroot.crates()), "--target", target])
         .arg("--target-dir")
         .arg(package.join("target"));
+    if sysroot == Sysroot::Firmware {
+        // With bitcode in the libraries, link-time optimisation reaches into core.
+        cargo.env(format!("CARGO_TARGET_{}_RUSTFLAGS", variable_form(target)), "-Cembed-bitcode=yes");
+    }
     command::run(&mut cargo)?;
 
-    let built = package.join("target").join(TARGET).join("release/deps");
-    for library in LIBRARIES {
-        copy_library(library, &built, &libraries(partial))?;
+    let built = package.join("target").join(target).join("release/deps");
+    let libraries = sysroot.libraries(partial);
+    match sysroot {
+        Sysroot::Firmware => {
+            for library in LIBRARIES {
+                copy_library(library, &built, &libraries)?;
+            }
+        }
+        Sysroot::Windows => {
+            copy_all_libraries(&built, &libraries)?;
+            start_and_end(distribution, &libraries)?;
+        }
     }
     // Build scripts and procedural macros run on this machine, so they link to the distribution's
     // own libraries.
@@ -208,11 +287,10 @@ fn build(distribution: &Distribution, partial: &Path, folder: &Path) -> Result<(
     fs::create_dir_all(host_folder.join("bin"))
         .with_context(|| format!("could not create {}", host_folder.display()))?;
     let own = distribution.sysroot.join("lib/rustlib").join(host).join("lib");
-    symlink(&own, host_folder.join("lib")).with_context(|| format!("could not link to {}", own.display()))?;
+    symlink(&own, &host_folder.join("lib"))?;
 
     write(&wrapper(partial), &script(folder)?)?;
-    fs::set_permissions(wrapper(partial), fs::Permissions::from_mode(0o755))
-        .with_context(|| format!("could not make {} executable", wrapper(partial).display()))?;
+    make_executable(&wrapper(partial))?;
     fs::remove_dir_all(&package).with_context(|| format!("could not remove {}", package.display()))
 }
 
@@ -229,6 +307,32 @@ fn copy_library(name: &str, from: &Path, to: &Path) -> Result<()> {
     fs::create_dir_all(to).with_context(|| format!("could not create {}", to.display()))?;
     let file = library.file_name().context("a listed file has a name")?;
     fs::copy(library, to.join(file)).with_context(|| format!("could not copy {}", library.display()))?;
+    Ok(())
+}
+
+/// `std` with every library that it depends on.
+fn copy_all_libraries(from: &Path, to: &Path) -> Result<()> {
+    fs::create_dir_all(to).with_context(|| format!("could not create {}", to.display()))?;
+    let entries = fs::read_dir(from).with_context(|| format!("could not list {}", from.display()))?;
+    for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        if path.extension().is_some_and(|ending| ending == "rlib") && !name.starts_with("libsysroot") {
+            fs::copy(&path, to.join(name)).with_context(|| format!("could not copy {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// The two objects that rustc puts around every program for Windows with the GNU tools; they are
+/// part of no crate.
+fn start_and_end(distribution: &Distribution, libraries: &Path) -> Result<()> {
+    for object in ["rsbegin", "rsend"] {
+        let mut rustc = Command::new(RUSTC);
+        rustc.env("RUSTC_BOOTSTRAP", "1").args(["--target", WINDOWS, "--crate-type=lib", "--emit=obj", "-o"]);
+        rustc.arg(libraries.join(format!("{object}.o")));
+        rustc.arg(distribution.sources().join("rtstartup").join(format!("{object}.rs")));
+        command::run(&mut rustc)?;
+    }
     Ok(())
 }
 
@@ -260,10 +364,11 @@ fn find_linker(distribution: &Distribution) -> Result<Option<PathBuf>> {
 
 /// Whether the sysroot is complete and intended for this path: the wrapper contains its folder, so
 /// a moved sysroot is rebuilt.
-fn is_whole(folder: &Path) -> bool {
+fn is_whole(folder: &Path, sysroot: Sysroot) -> bool {
     let meant =
         fs::read_to_string(wrapper(folder)).ok().is_some_and(|own| script(folder).is_ok_and(|s| s == own));
-    meant && command::is_executable(&wrapper(folder)) && has_core(&libraries(folder))
+    let last = matching(&sysroot.libraries(folder), sysroot.last());
+    meant && command::is_executable(&wrapper(folder)) && !last.is_empty()
 }
 
 /// The wrapper that makes the compiler use `folder`.
@@ -274,10 +379,6 @@ fn script(folder: &Path) -> Result<String> {
 /// The script in a sysroot that replaces `rustc`.
 pub fn wrapper(folder: &Path) -> PathBuf {
     folder.join("bin/rustc")
-}
-
-fn libraries(folder: &Path) -> PathBuf {
-    folder.join("lib/rustlib").join(TARGET).join("lib")
 }
 
 fn linker_link(folder: &Path, distribution: &Distribution) -> Result<PathBuf> {
@@ -304,7 +405,7 @@ fn is_at_least(version: &str, minimum: &str) -> bool {
 }
 
 /// The form of a target's name in cargo's environment variables.
-fn variable_form(target: &str) -> String {
+pub fn variable_form(target: &str) -> String {
     target.to_ascii_uppercase().replace(['-', '.'], "_")
 }
 
@@ -347,17 +448,23 @@ mod tests {
         assert!(has_core(folder.path()));
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_sysroot_that_was_moved_is_not_taken_for_a_whole_one() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let (here, there) = (folder.path().join("it's here"), folder.path().join("there"));
-        write(&libraries(&here).join("libcore-123.rlib"), "").expect("a writable folder");
+        let (firmware, windows) = (Sysroot::Firmware, Sysroot::Windows);
+        write(&firmware.libraries(&here).join("libcore-123.rlib"), "").expect("a writable folder");
         write(&wrapper(&here), &script(&here).expect("a path in UTF-8")).expect("a writable folder");
-        assert!(!is_whole(&here), "the wrapper is no program yet");
-        fs::set_permissions(wrapper(&here), fs::Permissions::from_mode(0o755)).expect("our own file");
-        assert!(is_whole(&here));
+        assert!(!is_whole(&here, firmware), "the wrapper is no program yet");
+        make_executable(&wrapper(&here)).expect("our own file");
+        assert!(is_whole(&here, firmware) && !is_whole(&here, windows));
+        write(&windows.libraries(&here).join("libstd-123.rlib"), "").expect("a writable folder");
+        assert!(!is_whole(&here, windows), "it has no library for tests");
+        write(&windows.libraries(&here).join("libtest-123.rlib"), "").expect("a writable folder");
+        assert!(is_whole(&here, windows));
         fs::rename(&here, &there).expect("a writable folder");
-        assert!(!is_whole(&there) && !is_whole(&here));
+        assert!(!is_whole(&there, firmware) && !is_whole(&here, firmware));
     }
 
     #[test]

@@ -81,7 +81,7 @@ pub fn run(project: &Project, scope: Scope, extra: &[String]) -> Result<Counts> 
 }
 
 /// Adds up the programs' reports, or fails with the names of the failed tests.
-fn concluded(ended: &[Ended]) -> Result<Counts> {
+pub fn concluded(ended: &[Ended]) -> Result<Counts> {
     let (mut counts, mut failures) = (Counts::default(), Vec::new());
     for ended in ended {
         let output = String::from_utf8_lossy(&ended.output);
@@ -195,12 +195,14 @@ const LONGEST: [(&str, &str); 3] = [("jointrig-tests", "it"), ("jointrig", "it")
 
 /// One test program.
 #[derive(Debug, PartialEq, Eq)]
-struct Program {
-    package: String,
+pub struct Program {
+    /// The name of its package.
+    pub package: String,
     target: String,
     /// The folder of its package, in which `cargo test` would start it.
-    folder: PathBuf,
-    path: PathBuf,
+    pub folder: PathBuf,
+    /// The built file.
+    pub path: PathBuf,
 }
 
 /// Every test program, and the documentation tests, the longest first. `selection` is passed to
@@ -258,7 +260,7 @@ fn place(package: &str, target: &str) -> usize {
 }
 
 /// The test programs in cargo's messages, one JSON object per line.
-fn programs(messages: &str) -> Result<Vec<Program>> {
+pub fn programs(messages: &str) -> Result<Vec<Program>> {
     let mut programs = Vec::new();
     for line in messages.lines() {
         let message: Value = serde_json::from_str(line).with_context(|| format!("cargo said: {line}"))?;

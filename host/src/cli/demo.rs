@@ -88,8 +88,8 @@ impl Demo {
     /// The command that repeats this one.
     fn again(&self) -> String {
         let full = if self.full { " --full" } else { "" };
-        let rig = self.rig.as_ref().map(|path| format!(" --rig {}", path.display())).unwrap_or_default();
-        format!("jointrig demo --out {} --seed {}{full}{rig}", self.out.display(), self.seed)
+        let rig = self.rig.as_ref().map(|path| format!(" --rig {}", quoted(path))).unwrap_or_default();
+        format!("jointrig demo --out {} --seed {}{full}{rig}", quoted(&self.out), self.seed)
     }
 
     fn marks(&self) -> Result<Marks, CliError> {

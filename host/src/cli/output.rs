@@ -116,6 +116,35 @@ pub fn catch(stop: &Arc<AtomicBool>, part: &'static str) {
     if let Err(error) = set {
         log::warn!("Ctrl-C cannot be caught ({error}): it will end the program immediately");
     }
+    #[cfg(windows)]
+    if let Err(error) = catch_closing(stop) {
+        log::warn!("closing the window cannot be caught ({error}): it will end the program immediately");
+    }
+}
+
+/// Makes closing the console, logging off and shutting down set this flag. Windows ends the program
+/// as soon as its handler returns, but waits five seconds for it. ctrlc's returns at once; tokio's
+/// never does, and the one that was set last is asked first. Until then the program ends by itself
+/// as after Ctrl-C: hammer and shaker come to rest when the session ends. A longer shot is cut
+/// short, and the controller stops both because its host is gone.
+#[cfg(windows)]
+fn catch_closing(stop: &Arc<AtomicBool>) -> std::io::Result<()> {
+    use tokio::signal::windows::{ctrl_close, ctrl_logoff, ctrl_shutdown};
+
+    let (mut close, mut logoff, mut shutdown) = (ctrl_close()?, ctrl_logoff()?, ctrl_shutdown()?);
+    let runtime = tokio::runtime::Builder::new_current_thread().build()?;
+    let raised = Arc::clone(stop);
+    std::thread::Builder::new().name("console".into()).spawn(move || {
+        runtime.block_on(async {
+            tokio::select! {
+                _ = close.recv() => {}
+                _ = logoff.recv() => {}
+                _ = shutdown.recv() => {}
+            }
+        });
+        raised.store(true, Ordering::Relaxed);
+    })?;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -148,9 +148,19 @@ fn open_sim(rig: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transpor
     Ok(Box::new(Sim::open(rig, seed)?))
 }
 
-#[cfg(feature = "sim")]
+#[cfg(all(feature = "sim", unix))]
 fn open_qemu(image: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
     Ok(Box::new(super::qemu::Qemu::open(image, seed)?))
+}
+
+#[cfg(all(feature = "sim", not(unix)))]
+fn open_qemu(image: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+    Err(DeviceError::Open {
+        address: Address::Qemu { image: image.map(Into::into) }.to_string(),
+        why: "the emulator shares its memory with jointrig in a way that only Linux and macOS have; use sim:, which \
+              measures the same rig with the same firmware"
+            .into(),
+    })
 }
 
 #[cfg(not(feature = "sim"))]

@@ -163,14 +163,30 @@ fn command_of(line: &str) -> Result<Command, String> {
     Ok(command)
 }
 
+/// The command line as a command. A program gets its arguments as one text on Windows and splits
+/// them itself, so they are passed on as they were written. Without a shell: ending it would not end
+/// the program.
 #[cfg(windows)]
 fn command_of(line: &str) -> Result<Command, String> {
     use std::os::windows::process::CommandExt;
 
     const CREATE_NEW_PROCESS_GROUP: u32 = 0x200;
-    let mut command = Command::new("cmd");
-    command.args(["/C", line]).creation_flags(CREATE_NEW_PROCESS_GROUP);
+    let (program, arguments) = program_and_arguments(line)?;
+    let mut command = Command::new(program);
+    command.raw_arg(arguments).creation_flags(CREATE_NEW_PROCESS_GROUP);
     Ok(command)
+}
+
+/// The program that a command line of Windows names, which is quoted if its path has spaces, and
+/// the text after it.
+#[cfg(any(windows, test))]
+fn program_and_arguments(line: &str) -> Result<(&str, &str), String> {
+    let line = line.trim();
+    let (program, arguments) = match line.strip_prefix('"') {
+        Some(quoted) => quoted.split_once('"').ok_or("its quotation marks do not match")?,
+        None => line.split_at(line.find(char::is_whitespace).unwrap_or(line.len())),
+    };
+    if program.is_empty() { Err("no program is named".into()) } else { Ok((program, arguments.trim_start())) }
 }
 
 /// Logs every line and keeps the last one.
@@ -264,5 +280,30 @@ impl Transport for BridgedRecorder {
 
     fn take_remarks(&mut self) -> Vec<String> {
         self.device.take_remarks()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_program_of_a_command_line_of_windows_may_be_quoted_and_its_arguments_stay_as_they_are() {
+        for (line, program, arguments) in [
+            ("python my_daq.py --rate 25600", "python", "my_daq.py --rate 25600"),
+            (
+                r#""C:\Program Files\Py\python.exe" "my daq.py" -x"#,
+                r"C:\Program Files\Py\python.exe",
+                r#""my daq.py" -x"#,
+            ),
+            (r"  C:\daq.exe  ", r"C:\daq.exe", ""),
+            ("py\t-3 a.py", "py", "-3 a.py"),
+        ] {
+            assert_eq!(program_and_arguments(line), Ok((program, arguments)), "{line}");
+        }
+        assert!(
+            program_and_arguments(r#""C:\Program Files\a.exe -x"#).expect_err("open").contains("quotation")
+        );
+        assert!(program_and_arguments(r#""" -x"#).expect_err("none").contains("no program"));
     }
 }

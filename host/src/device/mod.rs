@@ -13,7 +13,7 @@ pub mod error;
 mod inbox;
 pub mod link;
 pub mod logs;
-#[cfg(feature = "sim")]
+#[cfg(all(feature = "sim", unix))]
 mod qemu;
 mod requests;
 pub mod samples;

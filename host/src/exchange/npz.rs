@@ -671,9 +671,10 @@ impl NpzOutput {
         values: impl Iterator<Item = T>,
     ) -> Result<(), NpzError> {
         let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
-        // a fixed date keeps files of the same content identical
+        // a fixed date and system keep files of the same content identical
         let options = SimpleFileOptions::default()
             .last_modified_time(zip::DateTime::default())
+            .system(zip::System::Unix)
             .compression_method(self.packing)
             // records are the bulk of the data: the default level takes 2.5 times as long for half
             // the size

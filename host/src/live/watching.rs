@@ -312,16 +312,7 @@ fn unix_ms() -> f64 {
 
 /// Free bytes on the file's disk; `None` where the system does not report them.
 fn free_bytes(file: &std::path::Path) -> Option<u64> {
-    #[cfg(unix)]
-    {
-        let disk = rustix::fs::statvfs(file).ok()?;
-        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
-    }
-    #[cfg(not(unix))]
-    {
-        let _ = file;
-        None
-    }
+    fs4::available_space(file).ok()
 }
 
 /// The type of a device's samples of this channel.

@@ -273,9 +273,7 @@ fn prompt(
 
 fn execute(command: &str, cell: &Cell, attempt: u32) -> Result<(), StageError> {
     let failed = |why: String| StageError::Command { command: command.into(), why };
-    let (shell, flag) = if cfg!(windows) { ("cmd", "/C") } else { ("sh", "-c") };
-    let status = Command::new(shell)
-        .args([flag, command])
+    let status = shell(command)
         .env("JOINTRIG_CONFIGURATION", configuration_name(cell.configuration))
         .env("JOINTRIG_IMPACT", &cell.impact)
         .env("JOINTRIG_RESPONSE", &cell.response)
@@ -284,6 +282,26 @@ fn execute(command: &str, cell: &Cell, attempt: u32) -> Result<(), StageError> {
         .status()
         .map_err(|error| failed(error.to_string()))?;
     if status.success() { Ok(()) } else { Err(failed(status.to_string())) }
+}
+
+/// The system's shell with this command.
+#[cfg(not(windows))]
+fn shell(command: &str) -> Command {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", command]);
+    shell
+}
+
+/// cmd gets the command as it was written: quoting it as other programs read it would change its
+/// own quotation marks. With `/S` it removes the outer ones only; `/D` leaves out what the registry
+/// may run first.
+#[cfg(windows)]
+fn shell(command: &str) -> Command {
+    use std::os::windows::process::CommandExt;
+
+    let mut shell = Command::new("cmd");
+    shell.raw_arg(format!("/D /S /C \"{command}\""));
+    shell
 }
 
 /// Evidence, as text for the user, that this is another structure than before; `None` if there is
@@ -375,7 +393,6 @@ mod tests {
         assert!(matches!(answered("").0, Err(StageError::NobodyThere)));
     }
 
-    #[cfg(unix)]
     #[test]
     fn a_command_is_told_the_cell_and_its_failure_counts() {
         let cell = Cell {
@@ -384,7 +401,12 @@ mod tests {
             response: "B2".into(),
             wanted: 1,
         };
-        let test = "test $JOINTRIG_CONFIGURATION/$JOINTRIG_IMPACT/$JOINTRIG_RESPONSE/$JOINTRIG_ATTEMPT = AJB/AZ1/B2/3";
+        let test = if cfg!(windows) {
+            "if \"%JOINTRIG_CONFIGURATION%/%JOINTRIG_IMPACT%/%JOINTRIG_RESPONSE%/%JOINTRIG_ATTEMPT%\" == \"AJB/AZ1/B2/3\" \
+             (exit 0) else (exit 1)"
+        } else {
+            "test \"$JOINTRIG_CONFIGURATION/$JOINTRIG_IMPACT/$JOINTRIG_RESPONSE/$JOINTRIG_ATTEMPT\" = AJB/AZ1/B2/3"
+        };
         execute(test, &cell, 3).expect("told");
         assert!(execute(test, &cell, 4).expect_err("another").to_string().contains("failed"));
     }

@@ -7,6 +7,8 @@ fn rescued(folder: &Path) -> Store {
     Store::open_read_only(&folder.join("a-rescued-1.jrig")).expect("copied beside it")
 }
 
+// on Windows an open file cannot be removed or replaced: see below
+#[cfg(not(windows))]
 #[test]
 fn a_file_that_goes_away_is_missed_at_once_and_what_it_held_is_saved() {
     for (what, says) in [
@@ -60,6 +62,54 @@ fn another_name_or_a_lock_file_that_is_gone_lets_nobody_in() {
     assert!(Store::open_read_only(&at("second.jrig")).is_ok(), "reading is always possible");
     std::fs::remove_file(at("second.jrig")).expect("removed");
     Store::open(&at("link.jrig")).expect("through a link, if nobody else writes").close().expect("closed");
+}
+
+#[cfg(windows)]
+#[test]
+fn an_open_file_its_log_and_its_lock_can_be_neither_removed_nor_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let store = Store::create(&at("a.jrig"), SMALL, "small.toml").expect("created");
+    store.log("before").expect("noted");
+    std::fs::write(at("other"), "another").expect("written");
+    for name in ["a.jrig", "a.jrig-wal", "a.jrig-lock"] {
+        std::fs::remove_file(at(name)).expect_err("removed an open file");
+        std::fs::rename(at(name), at("moved")).expect_err("renamed an open file");
+        std::fs::rename(at("other"), at(name)).expect_err("replaced an open file");
+    }
+    assert!(matches!(Store::open(&at("a.jrig")), Err(StoreError::Busy { .. })), "a second writer");
+    store.log("after").expect("noted");
+    store.close().expect("closed");
+    assert!(!at("a.jrig-lock").exists());
+    std::fs::hard_link(at("a.jrig"), at("second.jrig")).expect("linked");
+    for name in ["a.jrig", "second.jrig"] {
+        let error = Store::open(&at(name)).expect_err("two names");
+        assert!(matches!(error, StoreError::Links { links: 2, .. }), "{error}");
+    }
+    std::fs::remove_file(at("second.jrig")).expect("removed");
+    Store::open(&at("a.jrig")).expect("one name again").close().expect("closed");
+}
+
+#[test]
+fn a_path_may_be_longer_than_260_characters_and_in_any_language() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let deep =
+        folder.path().join("Jürgen").join("Пётр").join("測定").join("x".repeat(120)).join("y".repeat(120));
+    std::fs::create_dir_all(&deep).expect("a deep folder");
+    let (path, copy) = (deep.join("Messung №1 50%.jrig"), deep.join("copy.jrig"));
+    assert!(path.as_os_str().len() > 260);
+    let store = Store::create(&path, SMALL, "small.toml").expect("created");
+    store.log("before").expect("noted");
+    let reader = Store::open_read_only(&path).expect("read while it is written");
+    assert!(reader.log_lines(0).expect("log").iter().any(|(_, _, text)| text == "before"));
+    drop(reader);
+    store.back_up(&copy).expect("copied");
+    store.close().expect("closed");
+    Store::open(&path).expect("continued").close().expect("closed");
+    assert_eq!(Store::open_read_only(&copy).expect("read").verify().expect("checked"), []);
+    let left: Vec<_> =
+        std::fs::read_dir(&deep).expect("listed").map(|entry| entry.expect("it").file_name()).collect();
+    assert_eq!(left.len(), 2, "{left:?}");
 }
 
 #[test]

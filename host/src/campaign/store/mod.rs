@@ -28,8 +28,13 @@
 //! links is refused. Where a lock on the campaign file itself can coexist with SQLite's locks
 //! (Linux), that lock is held too, so that removing the lock file does not admit a second writer.
 //!
+//! On Windows the open lock file is itself the lock: it is opened so that nobody else can write,
+//! rename or remove it, but everybody can read the holder's name in it. `LockFileEx` would forbid
+//! reading too.
+//!
 //! Network shares: SQLite's write-ahead log needs memory shared between processes, which network
-//! file systems do not provide.
+//! file systems do not provide. Linux names them in its mount table; on Windows a path that leads
+//! to a server has a form of its own once mapped drives are resolved.
 //!
 //! A copy of a campaign file, taken even while the file is being written.
 //!
@@ -46,7 +51,9 @@ use rusqlite::config::DbConfig;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Row};
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
-use std::fs::{File, Metadata, TryLockError};
+use std::fs::File;
+#[cfg(not(windows))]
+use std::fs::TryLockError;
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -107,8 +114,7 @@ impl Store {
         refuse(path)?;
         let lock = Some(WriteLock::take(path)?);
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
-        let mut connection =
-            Connection::open_with_flags(path, flags).map_err(|error| sqlite(path, "creating", error))?;
+        let mut connection = connected(path, flags).map_err(|error| sqlite(path, "creating", error))?;
         let watch = chain::Watch::new(&mut connection).map_err(|error| sqlite(path, "creating", error))?;
         let mut store = Self { connection, path: path.into(), lock, tidy: false, watch, identity: None };
         store.begin_writing()?;
@@ -148,7 +154,7 @@ impl Store {
             StoreError::Sqlite { .. } if waiting => Err(StoreError::Unfinished { path: path.into() }),
             // if no shared memory can be created, no process can be writing either
             StoreError::Sqlite { .. } => {
-                let plain = path.display().to_string();
+                let plain = for_sqlite(path).0.display().to_string();
                 let escaped = plain.replace('%', "%25").replace('?', "%3f").replace('#', "%23");
                 let name = PathBuf::from(format!("file:{escaped}?immutable=1"));
                 Self::connect(path, &name, flags | OpenFlags::SQLITE_OPEN_URI)
@@ -170,7 +176,7 @@ impl Store {
             }
             other => sqlite(path, "opening", other),
         };
-        let mut connection = Connection::open_with_flags(name, flags).map_err(open)?;
+        let mut connection = connected(name, flags).map_err(open)?;
         connection.busy_timeout(PATIENCE).map_err(open)?;
         let number = |pragma: &str| connection.pragma_query_value(None, pragma, |row| row.get::<_, i32>(0));
         if number("application_id").map_err(open)? != APPLICATION_ID {
@@ -332,6 +338,36 @@ impl Drop for Store {
     }
 }
 
+/// Opens a file with SQLite.
+fn connected(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
+    match for_sqlite(path) {
+        (path, None) => Connection::open_with_flags(path, flags),
+        (path, Some(long)) => Connection::open_with_flags_and_vfs(path, flags, long),
+    }
+}
+
+/// The name under which SQLite opens a file, and the variant of its file access, if not the default.
+#[cfg(not(windows))]
+fn for_sqlite(path: &Path) -> (PathBuf, Option<&'static str>) {
+    (path.into(), None)
+}
+
+/// Windows refuses paths of 260 characters or more, unless they have the verbatim form `\\?\C:\…`,
+/// which SQLite passes on in its variant for long paths. SQLite appends `-journal` to the name.
+#[cfg(windows)]
+fn for_sqlite(path: &Path) -> (PathBuf, Option<&'static str>) {
+    const LONGEST: usize = 260 - "-journal".len() - 1;
+    let Ok(absolute) = std::path::absolute(path) else { return (path.into(), None) };
+    if absolute.as_os_str().len() <= LONGEST {
+        return (path.into(), None);
+    }
+    // only existing paths have a verbatim form, and a new file does not exist yet
+    match (absolute.parent().map(Path::canonicalize), absolute.file_name()) {
+        (Some(Ok(folder)), Some(name)) => (folder.join(name), Some("win32-longpath")),
+        _ => (path.into(), None),
+    }
+}
+
 /// Key of the note that the file is being written, and since when.
 const WRITTEN: &str = "written_since";
 
@@ -370,15 +406,15 @@ impl Identity {
     pub(super) fn of(path: &Path) -> Self {
         // SQLite follows a symbolic link, and places its log next to the target
         let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.into());
-        let file = std::fs::metadata(&path).ok().and_then(|file| inode(&file));
+        let file = number(&path).ok().flatten();
         Self { path, file }
     }
 
     /// What happened to the file or its log since; `None` if both are present. To be called after a
     /// transaction in WAL mode.
     pub(super) fn lost(&self) -> Option<String> {
-        let Ok(now) = std::fs::metadata(&self.path) else { return Some("it was removed or renamed".into()) };
-        if self.file.is_some() && inode(&now) != self.file {
+        let Ok(now) = number(&self.path) else { return Some("it was removed or renamed".into()) };
+        if self.file.is_some() && now != self.file {
             return Some("another file has its name now".into());
         }
         let log = log_of(&self.path);
@@ -391,27 +427,44 @@ impl Identity {
     }
 }
 
-/// Device and inode, on systems that have them.
+/// Device and inode, which tell files apart whatever their names.
+///
+/// # Errors
+/// There is no such file.
 #[cfg(unix)]
-#[allow(clippy::unnecessary_wraps, reason = "other systems have none")]
-fn inode(file: &Metadata) -> Option<(u64, u64)> {
+fn number(path: &Path) -> std::io::Result<Option<(u64, u64)>> {
     use std::os::unix::fs::MetadataExt;
-    Some((file.dev(), file.ino()))
+    let file = std::fs::metadata(path)?;
+    Ok(Some((file.dev(), file.ino())))
 }
 
-/// On other systems an open file can be neither removed nor replaced.
-#[cfg(not(unix))]
-fn inode(_: &Metadata) -> Option<(u64, u64)> {
-    None
+/// On Windows an open file can be neither removed nor replaced. If its drive is pulled out, and
+/// another one gets the same letter, writing to the open file fails.
+///
+/// # Errors
+/// There is no such file.
+#[cfg(windows)]
+fn number(path: &Path) -> std::io::Result<Option<(u64, u64)>> {
+    std::fs::metadata(path).map(|_| None)
 }
 
-/// Number of attempts if the lock file disappears while it is being locked.
+/// Number of attempts if the lock file disappears while it is being locked, or (on Windows) may be
+/// open in a program that only looks at it, such as a virus scanner.
 const TRIES: usize = 10;
+
+/// Result of one attempt to lock.
+enum Claim {
+    /// Locked.
+    Held(File),
+    /// Locked by this process; whether it may be free in a moment, or the lock file is gone.
+    Busy { holder: String, again: bool },
+}
 
 /// The lock; released when dropped.
 #[derive(Debug)]
 pub(super) struct WriteLock {
-    file: File,
+    /// `None` only while it is being dropped.
+    file: Option<File>,
     path: PathBuf,
     /// The campaign file itself. It is closed after SQLite has closed it: closing it sooner would
     /// release SQLite's own locks.
@@ -429,28 +482,18 @@ impl WriteLock {
         refuse_second_names(&real)?;
         let path = beside(&real);
         let failed = |source| StoreError::Lock { path: campaign.into(), source };
+        let mut holder = String::new();
         for _ in 0..TRIES {
-            let mut file = File::options()
-                .read(true)
-                .write(true)
-                .create(true)
-                .truncate(false)
-                .open(&path)
-                .map_err(failed)?;
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(TryLockError::WouldBlock) => {
-                    let mut holder = String::new();
-                    // optional: the holder only improves the message
-                    let _ = file.read_to_string(&mut holder);
-                    return Err(StoreError::Busy { path: campaign.into(), holder: holder.trim().into() });
+            let mut file = match claimed(&path).map_err(failed)? {
+                Claim::Held(file) => file,
+                Claim::Busy { holder, again: false } => {
+                    return Err(StoreError::Busy { path: campaign.into(), holder });
                 }
-                Err(TryLockError::Error(source)) => return Err(failed(source)),
-            }
-            // its previous holder may have removed it after we opened and before we locked it
-            if !still_there(&file, &path) {
-                continue;
-            }
+                Claim::Busy { holder: now, again: true } => {
+                    holder = now;
+                    continue;
+                }
+            };
             let noted = file
                 .set_len(0)
                 .and_then(|()| file.rewind())
@@ -459,19 +502,66 @@ impl WriteLock {
                 log::debug!("{}: {error}", path.display());
             }
             #[cfg(target_os = "linux")]
-            return Ok(Self { itself: lock_itself(&real)?, file, path });
+            return Ok(Self { itself: lock_itself(&real)?, file: Some(file), path });
             #[cfg(not(target_os = "linux"))]
-            return Ok(Self { file, path });
+            return Ok(Self { file: Some(file), path });
         }
-        Err(StoreError::Busy { path: campaign.into(), holder: String::new() })
+        Err(StoreError::Busy { path: campaign.into(), holder })
+    }
+}
+
+/// Opens and locks a lock file.
+#[cfg(not(windows))]
+fn claimed(path: &Path) -> std::io::Result<Claim> {
+    let mut file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
+    match file.try_lock() {
+        // its previous holder may have removed it after we opened and before we locked it
+        Ok(()) if !still_there(&file, path) => Ok(Claim::Busy { holder: String::new(), again: true }),
+        Ok(()) => Ok(Claim::Held(file)),
+        Err(TryLockError::WouldBlock) => {
+            let mut holder = String::new();
+            // optional: the holder only improves the message
+            let _ = file.read_to_string(&mut holder);
+            Ok(Claim::Busy { holder: holder.trim().into(), again: false })
+        }
+        Err(TryLockError::Error(source)) => Err(source),
+    }
+}
+
+/// Opens a lock file so that nobody else can write, rename or remove it. As long as it is open,
+/// this fails in every other process, so no second call is needed to lock it.
+#[cfg(windows)]
+fn claimed(path: &Path) -> std::io::Result<Claim> {
+    use std::os::windows::fs::OpenOptionsExt;
+
+    const FILE_SHARE_READ: u32 = 1;
+    const ERROR_SHARING_VIOLATION: i32 = 32;
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false).share_mode(FILE_SHARE_READ);
+    match options.open(path) {
+        Ok(file) => Ok(Claim::Held(file)),
+        Err(error) if error.raw_os_error() == Some(ERROR_SHARING_VIOLATION) => {
+            // a virus scanner opens new files for a moment
+            std::thread::sleep(Duration::from_millis(20));
+            // optional: the holder only improves the message
+            let holder = std::fs::read_to_string(path).unwrap_or_default();
+            Ok(Claim::Busy { holder: holder.trim().into(), again: true })
+        }
+        Err(error) => Err(error),
     }
 }
 
 impl Drop for WriteLock {
     fn drop(&mut self) {
-        // removed while locked: another process that has already opened it checks for this
+        let file = self.file.take();
+        // Where the open file is the lock, it can only be removed once it is closed; if the next
+        // writer has opened it by then, removing it fails.
+        #[cfg(windows)]
+        drop(file);
+        // elsewhere it is removed while locked: a process that has already opened it checks for this
         let _ = std::fs::remove_file(&self.path);
-        let _ = self.file.unlock();
+        #[cfg(not(windows))]
+        let _ = file.map(|file| file.unlock());
         #[cfg(target_os = "linux")]
         if let Some(itself) = &self.itself {
             let _ = itself.unlock();
@@ -503,9 +593,14 @@ fn refuse_second_names(campaign: &Path) -> Result<(), StoreError> {
     }
 }
 
-#[cfg(not(unix))]
-fn refuse_second_names(_: &Path) -> Result<(), StoreError> {
-    Ok(())
+#[cfg(windows)]
+fn refuse_second_names(campaign: &Path) -> Result<(), StoreError> {
+    match File::open(campaign).and_then(winapi_util::file::information) {
+        Ok(file) if file.number_of_links() > 1 => {
+            Err(StoreError::Links { path: campaign.into(), links: file.number_of_links() })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn beside(campaign: &Path) -> PathBuf {
@@ -523,13 +618,8 @@ fn still_there(file: &File, path: &Path) -> bool {
     }
 }
 
-/// On other systems an open file cannot be removed.
-#[cfg(not(unix))]
-fn still_there(_: &File, _: &Path) -> bool {
-    true
-}
-
 /// Network file systems, by their names in Linux's mount table; these may have the prefix `fuse.`.
+#[cfg(any(unix, test))]
 const NETWORK: [&str; 22] = [
     "9p",
     "afs",
@@ -555,8 +645,35 @@ const NETWORK: [&str; 22] = [
     "virtiofs",
 ];
 
+/// Refuses to write a campaign on a network share. A mapped drive (`Z:`) is resolved to its share.
+#[cfg(windows)]
+pub(super) fn refuse(campaign: &Path) -> Result<(), StoreError> {
+    let folder = campaign.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let forms = [folder.canonicalize(), std::path::absolute(folder)];
+    match forms.iter().flatten().find_map(|folder| windows_share(&folder.to_string_lossy())) {
+        Some(kind) => Err(StoreError::Share { path: campaign.into(), kind }),
+        None => Ok(()),
+    }
+}
+
+/// The share `\\server\share` to which an absolute path of Windows leads; `None` for a local disk.
+#[cfg(any(windows, test))]
+fn windows_share(path: &str) -> Option<String> {
+    let path = path.replace('/', r"\");
+    let rest = match path.strip_prefix(r"\\?\").or_else(|| path.strip_prefix(r"\\.\")) {
+        // "UNC\server\share\…", or a disk: "C:\…", "Volume{…}\…"
+        Some(verbatim) => {
+            verbatim.split_at_checked(4).filter(|(unc, _)| unc.eq_ignore_ascii_case(r"UNC\"))?.1
+        }
+        None => path.strip_prefix(r"\\")?,
+    };
+    let mut names = rest.split('\\');
+    Some(format!(r"\\{}\{}", names.next()?, names.next().unwrap_or_default()))
+}
+
 /// Refuses to write a campaign on a network share. Only Linux provides a mount table; on other
-/// systems nothing is refused.
+/// Unix systems nothing is refused.
+#[cfg(unix)]
 pub(super) fn refuse(campaign: &Path) -> Result<(), StoreError> {
     let folder = campaign.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let (Ok(table), Ok(folder)) = (std::fs::read_to_string("/proc/self/mountinfo"), folder.canonicalize())
@@ -571,6 +688,7 @@ pub(super) fn refuse(campaign: &Path) -> Result<(), StoreError> {
 
 /// The kind of file system under `folder`, if it is a network file system. `table` is Linux's
 /// `mountinfo`.
+#[cfg(any(unix, test))]
 fn network(table: &str, folder: &Path) -> Option<String> {
     let mounts = table.lines().filter_map(|line| {
         // "36 35 98:0 / /mnt rw,noatime shared:1 - ext3 /dev/root rw"
@@ -585,6 +703,7 @@ fn network(table: &str, folder: &Path) -> Option<String> {
 }
 
 /// Decodes space, tab, newline and backslash, which the kernel writes as octal numbers.
+#[cfg(any(unix, test))]
 fn unescaped(text: &str) -> String {
     [("\\040", " "), ("\\011", "\t"), ("\\012", "\n"), ("\\134", "\\")]
         .into_iter()
@@ -618,7 +737,7 @@ impl Store {
 
     fn copy(&self, to: &Path) -> Result<usize, StoreError> {
         let failed = |error| sqlite(to, "copying", error);
-        let mut copy = Connection::open(to).map_err(failed)?;
+        let mut copy = connected(to, OpenFlags::default()).map_err(failed)?;
         {
             let backup = rusqlite::backup::Backup::new(&self.connection, &mut copy).map_err(failed)?;
             // all pages in one step: a reader's snapshot, unaffected by a writer
@@ -789,5 +908,27 @@ mod share_tests {
         assert_eq!(of("/mnt/share").as_deref(), Some("cifs"));
         assert_eq!(of("/mnt/sharedisk"), None);
         assert_eq!(of("/mnt/ssh/x").as_deref(), Some("fuse.sshfs"));
+    }
+
+    #[test]
+    fn a_path_of_windows_that_leads_to_a_server_is_a_share_in_every_form() {
+        for (path, share) in [
+            (r"\\nas\lab\2026\a.jrig", Some(r"\\nas\lab")),
+            ("//nas/lab/a.jrig", Some(r"\\nas\lab")),
+            (r"\\?\UNC\nas\lab\a.jrig", Some(r"\\nas\lab")),
+            (r"\\?\unc\nas\lab", Some(r"\\nas\lab")),
+            (r"\\.\UNC\nas\lab\a.jrig", Some(r"\\nas\lab")),
+            (r"\\wsl.localhost\Debian\home", Some(r"\\wsl.localhost\Debian")),
+            (r"\\cloud@SSL\DavWWWRoot\x", Some(r"\\cloud@SSL\DavWWWRoot")),
+            (r"C:\lab\a.jrig", None),
+            (r"C:\UNC\nas\lab", None),
+            (r"\\?\C:\UNC\a.jrig", None),
+            (r"\\?\Volume{0ba1}\a.jrig", None),
+            (r"\\?\UNCLE\a.jrig", None),
+            (r"\\?\Ü:", None),
+            (r"\lab\a.jrig", None),
+        ] {
+            assert_eq!(windows_share(path).as_deref(), share, "{path}");
+        }
     }
 }

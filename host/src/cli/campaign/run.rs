@@ -1,7 +1,7 @@
 //! `campaign run`: measures what is missing. `demo` runs its campaign by the same function.
 
 use super::calibrate;
-use crate::advice::quoted;
+use crate::advice::{quoted, quoted_word};
 use crate::campaign::plan::{Cell, Plan};
 use crate::campaign::run::progress::CampaignProgress;
 use crate::campaign::run::runner;
@@ -105,7 +105,8 @@ impl Run {
         self.mention_shaker(&store)?;
         let stop = output::flag();
         let mut onlooker = self.page.start(Some(&self.file), &stop, self.allows_control())?;
-        let again = format!("jointrig campaign run {} --device {address}", quoted(&self.file));
+        let device = quoted_word(&address.to_string());
+        let again = format!("jointrig campaign run {} --device {device}", quoted(&self.file));
         let device = Device { address: &address, seed: self.seed, log_tables: self.log_tables };
         let who = Who { stage: self.stage, yes: self.yes, new_structure: self.new_structure, stop };
         let mut judge = Ringing { rings: self.bell };
