@@ -38,7 +38,7 @@ const GLIBC: (u32, u32) = (2, 17);
 const LINUX_TOOLS: [&str; 2] = ["cargo-zigbuild", "ziglang"];
 
 /// Maximum size of the command, bytes.
-const PROGRAM: u64 = 20_000_000;
+const PROGRAM: u64 = 25_000_000;
 
 /// Crates that are published, each after those that it depends on.
 const CRATES: [&str; 4] = ["jointrig-hot", "jointrig-protocol", "jointrig-analysis", "jointrig-uff"];
@@ -222,7 +222,8 @@ impl Release<'_> {
             cargo
         };
         cargo.args(["--release", "--locked", "--package", "jointrig", "--bin", "jointrig"]);
-        cargo.env("CARGO_TARGET_DIR", &self.project.target);
+        // the program must not depend on a contributor's settings
+        cargo.env("CARGO_TARGET_DIR", &self.project.target).env("CARGO_INCREMENTAL", "0");
         command::run(&mut cargo).with_context(|| format!("the program for {target} cannot be built"))?;
         let name = if target.contains("windows") { "jointrig.exe" } else { "jointrig" };
         Ok(self.project.target.join(target).join("release").join(name))

@@ -9,6 +9,7 @@ use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
 use crate::device::error::{UDEV_RULE, flash_file};
 use crate::device::logs::Tables;
+use crate::device::serial::ports;
 use crate::device::session::Session;
 use crate::device::usb;
 use clap::Args;
@@ -240,7 +241,7 @@ impl Devices {
             })),
             Err(error) => log::warn!("USB devices cannot be listed: {error}"),
         }
-        match serialport::available_ports() {
+        match ports() {
             Ok(ports) => found.extend(ports.into_iter().map(|port| {
                 let (name, serial) = match port.port_type {
                     SerialPortType::UsbPort(usb) => {

@@ -19,7 +19,7 @@ use crate::campaign::store::session_table::Counters;
 use crate::campaign::verdict::judge::ByRecord;
 use crate::device::address::Address;
 use crate::device::error::permission_advice;
-use crate::device::serial::Serial;
+use crate::device::serial::{Serial, ports};
 use crate::device::usb::{Usb, attached};
 use crate::report;
 use crate::untrusted_text::tell_line;
@@ -546,7 +546,7 @@ fn controllers() -> Vec<Check> {
             }
         })),
     }
-    match serialport::available_ports() {
+    match ports() {
         Err(error) => checks.push(Check::advises(
             "serial",
             format!("serial ports cannot be listed: {error}"),

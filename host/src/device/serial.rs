@@ -57,6 +57,28 @@ impl Serial {
     }
 }
 
+/// Where Linux lists its serial ports.
+const LINUX_PORTS: &str = "/sys/class/tty";
+
+/// The serial ports of this PC.
+///
+/// # Errors
+/// The system cannot list them. The list of `serialport` panics on a Linux without
+/// [`LINUX_PORTS`], such as a chroot or a container.
+pub(crate) fn ports() -> Result<Vec<serialport::SerialPortInfo>, serialport::Error> {
+    listed(if cfg!(target_os = "linux") { Some(Path::new(LINUX_PORTS)) } else { None })
+}
+
+/// The same, where this folder must exist.
+fn listed(needed: Option<&Path>) -> Result<Vec<serialport::SerialPortInfo>, serialport::Error> {
+    if let Some(folder) = needed.filter(|folder| !folder.is_dir()) {
+        let what =
+            format!("there is no {}: mount /sys, or use a PC instead of a container", folder.display());
+        return Err(serialport::Error::new(ErrorKind::Io(io::ErrorKind::NotFound), what));
+    }
+    serialport::available_ports()
+}
+
 impl Transport for Serial {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
         self.set_timeout(timeout)?;
@@ -72,5 +94,18 @@ impl Transport for Serial {
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.set_timeout(WRITE_PATIENCE)?;
         self.port.write_all(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_system_that_lists_no_ports_is_an_error_and_no_panic() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let none = folder.path().join("none");
+        let error = listed(Some(&none)).expect_err("no such folder").to_string();
+        assert!(error.contains("none") && error.contains("mount /sys"), "{error}");
     }
 }
