@@ -128,6 +128,13 @@ impl Release<'_> {
             fs::remove_file(old.path())
                 .with_context(|| format!("could not remove {}", old.path().display()))?;
         }
+        // what takes seconds comes first; it needs only cargo's metadata, so it can be made for the
+        // targets that cannot be built
+        for target in TARGETS {
+            self.components(target)?;
+        }
+        self.firmware()?;
+        self.crates()?;
         let mut left_out = Vec::new();
         for target in TARGETS {
             match cannot_build(target) {
@@ -138,12 +145,6 @@ impl Release<'_> {
                 }
             }
         }
-        // needs only cargo's metadata, so it can be made for the targets that cannot be built
-        for target in TARGETS {
-            self.components(target)?;
-        }
-        self.firmware()?;
-        self.crates()?;
         let sizes = write_sums(&self.folder)?;
         println!("\nversion {}, in {}:", self.version, self.folder.display());
         for (name, bytes) in sizes {
