@@ -334,7 +334,9 @@ pub fn build_release(project: &Project, target: &str) -> Result<PathBuf> {
         .arg(&out)
         .arg("--interpreter")
         .arg(interpreter);
-    maturin.env("PATH", before_path(&tools)?).env("CARGO_TARGET_DIR", &project.target);
+    // the wheel must not depend on a contributor's settings
+    maturin.env("PATH", before_path(&tools)?).env("CARGO_INCREMENTAL", "0");
+    maturin.env("CARGO_TARGET_DIR", &project.target);
     command::run(&mut maturin).with_context(|| format!("the wheel for {target} cannot be built"))?;
     let built = fs::read_dir(&out)?.flatten().map(|entry| entry.path()).next();
     let wheel = built.with_context(|| format!("maturin left no wheel for {target}"))?;
