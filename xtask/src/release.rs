@@ -137,13 +137,12 @@ impl Release<'_> {
         self.crates()?;
         let mut left_out = Vec::new();
         for target in TARGETS {
-            match cannot_build(target) {
-                Some(why) => left_out.push(format!("{target}: {why}")),
-                None => {
-                    self.program(target)?;
-                    self.wheel(target)?;
-                }
+            if let Some(why) = cannot_build(target) {
+                left_out.push(format!("{target}: {why}"));
+                continue;
             }
+            self.program(target)?;
+            self.wheel(target)?;
         }
         let sizes = write_sums(&self.folder)?;
         println!("\nversion {}, in {}:", self.version, self.folder.display());
