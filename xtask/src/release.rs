@@ -76,8 +76,8 @@ pub struct Options {
     /// Check that the crates could be published.
     #[arg(long)]
     crates: bool,
-    /// Write the checksums of all files in this folder, or in target/release-files.
-    #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "")]
+    /// Write the checksums of all files in this folder.
+    #[arg(long, value_name = "DIR")]
     sums: Option<PathBuf>,
     /// Fail unless the version is that of this tag, such as v0.1.0.
     #[arg(long, value_name = "TAG")]
@@ -109,8 +109,7 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
         release.crates()?;
     }
     if let Some(folder) = &options.sums {
-        let own = folder.as_os_str().is_empty();
-        write_sums(if own { &release.folder } else { folder })?;
+        write_sums(folder)?;
     }
     Ok(())
 }
