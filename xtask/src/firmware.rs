@@ -98,9 +98,14 @@ fn build_binary(project: &Project, toolchain: &Toolchain, name: &str, binary: &s
     toolchain.apply(&mut cargo, project);
     cargo.args(["build", "--release", "--target", TARGET, "--package", name, "--bin", binary]);
     command::run(&mut cargo).with_context(|| format!("the image of {name} could not be built"))?;
-    let image = project.firmware_target().join(TARGET).join("release").join(binary);
+    let image = image_of(project, binary);
     keep_log_table(project, &image)?;
     Ok(image)
+}
+
+/// Where a board's image is built.
+pub fn image_of(project: &Project, binary: &str) -> PathBuf {
+    project.firmware_target().join(TARGET).join("release").join(binary)
 }
 
 /// Stores a copy of the image under its build id, by which a host finds the strings of the log

@@ -17,6 +17,7 @@ mod lint;
 mod packages;
 mod project;
 mod python;
+mod release;
 mod sbom;
 mod setup;
 mod size;
@@ -91,6 +92,9 @@ enum Task {
     /// Write the components of each program: every third-party crate with version, licence and
     /// checksum (CycloneDX).
     Sbom,
+    /// Make and check the files of a release: programs, wheels, firmware, component lists, checksums.
+    #[command(after_help = setup::ENVIRONMENT_HELP)]
+    Release(release::Options),
     /// Compare the numbers of spectra, universal files and virtual points with those of pyFRF,
     /// pyuff and pyFBS.
     Parity,
@@ -145,6 +149,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Wheels => python::run_release(&project),
         Task::Book { yes } => book::run(&project, packages::Consent::new(yes)),
         Task::Sbom => sbom::run(&project),
+        Task::Release(options) => release::run(&project, &options),
         Task::Parity => bench::parity(&project),
         Task::Accuracy { tables } => accuracy::run(&project, &tables),
         Task::Bench { hot_paths: true, extra, .. } => bench::hot_paths(&project, &extra),

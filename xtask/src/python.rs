@@ -6,8 +6,8 @@
 //!
 //! The wheels of a release are for the Linux systems of laboratories. The wheel of `cargo xtask
 //! python` needs the C library of the machine that built it. The released ones need only glibc 2.17
-//! (manylinux2014): maturin links them with Zig's linker, for x86-64 and for aarch64. They are only
-//! built here; of the two, only the first could also be run.
+//! (manylinux2014): maturin links them with Zig's linker, for x86-64 and for aarch64. Wheels for
+//! Windows and macOS are built on those systems, by `cargo xtask release --target`.
 
 use crate::command;
 use crate::project::Project;
@@ -261,7 +261,7 @@ pub fn pip<T: AsRef<std::ffi::OsStr>>(python: &Path, how: &[&str], packages: &[T
     .context("the packages cannot be installed")
 }
 
-/// Target machines of a release's wheels.
+/// Linux machines for which a release has wheels.
 const TARGETS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"];
 
 /// Old enough for typical computers at a rig.
@@ -270,7 +270,7 @@ const COMPATIBILITY: &str = "manylinux2014";
 /// The packages that build and link them.
 const RELEASE_TOOLS: [&str; 2] = ["maturin>=1.16,<2", "ziglang"];
 
-/// Builds a wheel for each target into `target/release-wheels`.
+/// Builds a wheel for each Linux target into `target/release-wheels`.
 pub fn run_release(project: &Project) -> Result<()> {
     let missing: Vec<&str> = TARGETS.into_iter().filter(|target| !installed(target)).collect();
     if !missing.is_empty() {
@@ -279,31 +279,14 @@ pub fn run_release(project: &Project) -> Result<()> {
             "the compiler has no standard library for {missing}: `rustup target add {missing}`, then again"
         );
     }
-    let found = interpreters();
-    let Some((_, interpreter)) = found.last_key_value() else {
-        bail!("maturin needs a Python of {}.{} or newer, and there is none", OLDEST.0, OLDEST.1)
-    };
-    let tools = environment(interpreter, &project.target.join("python/wheels-tools"), &RELEASE_TOOLS)
-        .context("no environment with maturin and ziglang can be made; pip needs its registry")?;
-    let out = project.target.join("release-wheels");
     for target in TARGETS {
-        println!("wheel for {target}, {COMPATIBILITY}");
-        build_release(project, &tools, interpreter, target, &out)?;
-    }
-    let mut built: Vec<_> = fs::read_dir(&out)?.flatten().map(|entry| entry.path()).collect();
-    built.sort();
-    for wheel in built {
-        let bytes = fs::metadata(&wheel)?.len();
-        println!("{} ({:.1} MB)", wheel.display(), bytes as f64 / 1e6);
-        if bytes > WHEEL {
-            bail!("it has {bytes} bytes, and {WHEEL} are allowed");
-        }
+        build_release(project, target)?;
     }
     Ok(())
 }
 
 /// Whether the compiler can build for that target.
-fn installed(target: &str) -> bool {
+pub fn installed(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let asked = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
     asked.is_ok_and(|said| {
@@ -311,21 +294,73 @@ fn installed(target: &str) -> bool {
     })
 }
 
-fn build_release(
-    project: &Project,
-    tools: &Path,
-    interpreter: &Path,
-    target: &str,
-    out: &Path,
-) -> Result<()> {
-    let mut maturin = Command::new(tools.with_file_name("maturin"));
-    maturin.current_dir(project.root.join("host/python"));
-    maturin.args(["build", "--release", "--locked", "--zig", "--compatibility", COMPATIBILITY]);
-    maturin.args(FOR_SIZE).args(["--target", target, "--out"]).arg(out).arg("--interpreter").arg(interpreter);
-    // maturin looks for Zig in the first Python on PATH
-    let own = tools.parent().context("an environment has a folder of programs")?;
+/// The newest Python here.
+pub fn newest() -> Result<PathBuf> {
+    let found = interpreters().pop_last();
+    let (_, interpreter) = found.with_context(|| {
+        format!("a Python of {}.{} or newer is needed, and there is none", OLDEST.0, OLDEST.1)
+    })?;
+    Ok(interpreter)
+}
+
+/// PATH with the programs of an environment first: Zig is looked for in the first Python on PATH.
+pub fn before_path(environment: &Path) -> Result<std::ffi::OsString> {
+    let own = environment.parent().context("an environment has a folder of programs")?;
     let before = std::env::var_os("PATH").unwrap_or_default();
-    let path = std::iter::once(own.to_path_buf()).chain(std::env::split_paths(&before));
-    maturin.env("PATH", std::env::join_paths(path)?).env("CARGO_TARGET_DIR", &project.target);
-    command::run(&mut maturin).with_context(|| format!("the wheel for {target} cannot be built"))
+    Ok(std::env::join_paths(std::iter::once(own.to_path_buf()).chain(std::env::split_paths(&before)))?)
+}
+
+/// Builds the wheel of a release for one target, in a folder of `target/release-wheels`; returns
+/// its path.
+pub fn build_release(project: &Project, target: &str) -> Result<PathBuf> {
+    let interpreter = newest()?;
+    let tools = environment(&interpreter, &project.target.join("python/wheels-tools"), &RELEASE_TOOLS)
+        .context("no environment with maturin and ziglang can be made; pip needs its registry")?;
+    let out = project.target.join("release-wheels").join(target);
+    if out.is_dir() {
+        fs::remove_dir_all(&out).context("old wheels cannot be removed")?;
+    }
+    let mut maturin = command::without_own_package(
+        tools.with_file_name(format!("maturin{}", std::env::consts::EXE_SUFFIX)),
+    );
+    maturin.current_dir(project.root.join("host/python"));
+    maturin.args(["build", "--release", "--locked"]);
+    if target.contains("linux") {
+        maturin.args(["--zig", "--compatibility", COMPATIBILITY]);
+    }
+    maturin
+        .args(FOR_SIZE)
+        .args(["--target", target, "--out"])
+        .arg(&out)
+        .arg("--interpreter")
+        .arg(interpreter);
+    // the wheel must not depend on a contributor's settings
+    maturin.env("PATH", before_path(&tools)?).env("CARGO_INCREMENTAL", "0");
+    maturin.env("CARGO_TARGET_DIR", &project.target);
+    command::run(&mut maturin).with_context(|| format!("the wheel for {target} cannot be built"))?;
+    let built = fs::read_dir(&out)?.flatten().map(|entry| entry.path()).next();
+    let wheel = built.with_context(|| format!("maturin left no wheel for {target}"))?;
+    let bytes = fs::metadata(&wheel)?.len();
+    println!("{} ({:.1} MB)", wheel.display(), bytes as f64 / 1e6);
+    if bytes > WHEEL {
+        bail!("it has {bytes} bytes, and {WHEEL} are allowed");
+    }
+    Ok(wheel)
+}
+
+/// Installs a wheel into an empty environment as a user does, and imports it there.
+pub fn try_out(project: &Project, wheel: &Path, version: &str) -> Result<()> {
+    let folder = project.target.join("python/release-user");
+    if folder.is_dir() {
+        fs::remove_dir_all(&folder).context("the old environment cannot be removed")?;
+    }
+    let python = environment(&newest()?, &folder, &[])?;
+    pip(&python, &["install", "--quiet"], &[wheel])?;
+    let script =
+        "import jointrig, importlib.metadata as m; print(jointrig.read_frf.__name__, m.version('jointrig'))";
+    let said = command::output(Command::new(&python).args(["-c", script]).current_dir(&folder))?;
+    if said.trim() != format!("read_frf {version}") {
+        bail!("{} is of another version: `{}` instead of {version}", wheel.display(), said.trim());
+    }
+    Ok(())
 }

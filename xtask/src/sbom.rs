@@ -48,6 +48,12 @@ pub fn of_board(root: &Path, package: &str, image: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
+/// Writes the document of a program of the root workspace for one target.
+pub fn of_program(project: &Project, package: &str, target: &str, path: &Path) -> Result<()> {
+    write(&Product { package, root: project.root.clone(), target: Some(target) }, path)?;
+    Ok(())
+}
+
 fn write(product: &Product<'_>, path: &Path) -> Result<usize> {
     let mut cargo = command::cargo(&product.root);
     cargo.args(["metadata", "--locked", "--format-version", "1"]);
@@ -65,7 +71,8 @@ fn write(product: &Product<'_>, path: &Path) -> Result<usize> {
     Ok(count)
 }
 
-fn host_target() -> Result<String> {
+/// The target of this machine.
+pub fn host_target() -> Result<String> {
     let told = command::output(std::process::Command::new("rustc").arg("-vV"))?;
     let host = told.lines().find_map(|line| line.strip_prefix("host: "));
     Ok(host.context("rustc does not say what it compiles for")?.to_owned())

@@ -7,8 +7,9 @@ use super::error::CliError;
 use super::output;
 use crate::device::address::Address;
 use crate::device::channels::ChannelMap;
-use crate::device::error::flash_file;
+use crate::device::error::{UDEV_RULE, flash_file};
 use crate::device::logs::Tables;
+use crate::device::serial::ports;
 use crate::device::session::Session;
 use crate::device::usb;
 use clap::Args;
@@ -207,6 +208,9 @@ pub struct Devices {
     /// Print one JSON document on stdout.
     #[arg(long)]
     json: bool,
+    /// Print the udev rule by which Linux lets you open the controller, instead of the list.
+    #[arg(long, conflicts_with = "json")]
+    udev_rule: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -218,6 +222,9 @@ struct FoundDevices {
 
 impl Devices {
     pub fn run(self) -> Result<(), CliError> {
+        if self.udev_rule {
+            return output::lines(UDEV_RULE.lines().map(str::to_owned));
+        }
         let mut found = Vec::new();
         if cfg!(feature = "sim") {
             found.push(FoundDevices {
@@ -234,7 +241,7 @@ impl Devices {
             })),
             Err(error) => log::warn!("USB devices cannot be listed: {error}"),
         }
-        match serialport::available_ports() {
+        match ports() {
             Ok(ports) => found.extend(ports.into_iter().map(|port| {
                 let (name, serial) = match port.port_type {
                     SerialPortType::UsbPort(usb) => {

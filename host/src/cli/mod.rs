@@ -35,6 +35,7 @@ mod open_page;
 mod output;
 mod page;
 mod plan;
+mod self_test;
 #[cfg(feature = "dashboard")]
 mod serve;
 mod shaker;
@@ -89,6 +90,8 @@ enum Command {
     Identify(identify::Identify),
     /// Identify natural frequencies, damping and shapes.
     Modes(modes::ModesArgs),
+    /// Test what works on this PC: measuring, analysis, speed, disk, live page, browser, controllers.
+    SelfTest(self_test::SelfTest),
     /// Print completions for a shell.
     Completions(Completions),
     /// Print the manual page, or write one for each command.
@@ -133,6 +136,7 @@ impl Cli {
             Command::Import(command) => command.run(),
             Command::Identify(command) => command.run(),
             Command::Modes(command) => command.run(),
+            Command::SelfTest(command) => command.run(),
             Command::Completions(command) => {
                 command.run();
                 Ok(())
@@ -233,6 +237,8 @@ mod tests {
             "demo --out d --seed 7",
             "demo --full --rig rigs/rigid-clamp.toml",
             "devices --json",
+            "devices --udev-rule",
+            "self-test --quick --folder data --json",
             "info --device sim: --json",
             "info --device usb: --log-tables tables",
             "campaign run p.jrig --device usb:0042 --log-tables tables",
@@ -290,6 +296,7 @@ mod tests {
             "hysteresis",
             "campaign check p.jrig --mass 1.2",
             "info",
+            "devices --json --udev-rule",
             "modes",
             "modes c.jrig --structure C",
             "modes c.jrig --band 800:20",

@@ -1,14 +1,50 @@
 //! Errors between host and device, worded for the operator.
 
 use std::io;
+use std::path::Path;
 
 use jointrig_protocol::answer::Refusal;
 use jointrig_protocol::hello::Mismatch;
 use jointrig_protocol::sync::ClockFault;
 
 /// Advice for "permission denied" on Linux.
-pub(super) const INSTALL_UDEV_RULE: &str = "install docs/udev/70-jointrig.rules (`sudo cp` it to /etc/udev/rules.d, \
-     then `sudo udevadm control --reload && sudo udevadm trigger`)";
+pub(super) const INSTALL_UDEV_RULE: &str = "install the udev rule (`jointrig devices --udev-rule | sudo tee \
+     /etc/udev/rules.d/70-jointrig.rules`, then `sudo udevadm control --reload && sudo udevadm trigger`)";
+
+/// The udev rule by which Linux lets the person at the machine open the controller.
+pub const UDEV_RULE: &str = include_str!("../../../docs/udev/70-jointrig.rules");
+
+/// Folders from which udev reads rules.
+const UDEV_FOLDERS: [&str; 4] =
+    ["/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"];
+
+/// What to do so that a controller may be opened on this system.
+pub fn permission_advice() -> String {
+    if cfg!(windows) {
+        return "no driver is needed from Windows 8.1 on, which loads WinUSB and usbser itself; if the device manager \
+                shows a yellow mark, see docs/first-light.md, \"USB\""
+            .into();
+    }
+    if !cfg!(target_os = "linux") {
+        return "no driver is needed; end other programs that hold the controller".into();
+    }
+    linux_advice(&UDEV_FOLDERS.map(Path::new))
+}
+
+/// The same for Linux, whose udev reads rules from these folders.
+fn linux_advice(folders: &[&Path]) -> String {
+    let installed =
+        folders.iter().find_map(|folder| std::fs::read_to_string(folder.join("70-jointrig.rules")).ok());
+    match installed {
+        None => INSTALL_UDEV_RULE.into(),
+        Some(rule) if rule == UDEV_RULE => {
+            "the udev rule is installed, and admits whoever is logged in at this PC's screen: unplug the controller \
+             and plug it in again"
+                .into()
+        }
+        Some(_) => format!("the installed udev rule is not that of this program: {INSTALL_UDEV_RULE}"),
+    }
+}
 
 /// The firmware file that matches this program, for the device at an address.
 pub fn flash_file(address: &str) -> &'static str {
@@ -175,4 +211,21 @@ pub enum DeviceError {
         /// What is wrong, and what to do.
         what: String,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_or_changed_udev_rule_is_told_with_the_command_that_installs_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("70-jointrig.rules");
+        let said = || linux_advice(&[&folder.path().join("none"), folder.path()]);
+        assert!(said().starts_with("install the udev rule (`jointrig devices --udev-rule"), "{}", said());
+        std::fs::write(&path, "# another").expect("written");
+        assert!(said().contains("is not that of this program: install"), "{}", said());
+        std::fs::write(&path, UDEV_RULE).expect("written");
+        assert!(said().contains("plug it in again") && !said().contains("sudo"), "{}", said());
+    }
 }

@@ -17,7 +17,7 @@ pub mod logs;
 mod qemu;
 mod requests;
 pub mod samples;
-mod serial;
+pub(crate) mod serial;
 pub mod session;
 #[cfg(feature = "sim")]
 mod sim;

@@ -95,6 +95,28 @@ impl Serial {
     }
 }
 
+/// Where Linux lists its serial ports.
+const LINUX_PORTS: &str = "/sys/class/tty";
+
+/// The serial ports of this PC.
+///
+/// # Errors
+/// The system cannot list them. The list of `serialport` panics on a Linux without
+/// [`LINUX_PORTS`], such as a chroot or a container.
+pub(crate) fn ports() -> Result<Vec<serialport::SerialPortInfo>, serialport::Error> {
+    listed(if cfg!(target_os = "linux") { Some(Path::new(LINUX_PORTS)) } else { None })
+}
+
+/// The same, where this folder must exist.
+fn listed(needed: Option<&Path>) -> Result<Vec<serialport::SerialPortInfo>, serialport::Error> {
+    if let Some(folder) = needed.filter(|folder| !folder.is_dir()) {
+        let what =
+            format!("there is no {}: mount /sys, or use a PC instead of a container", folder.display());
+        return Err(serialport::Error::new(ErrorKind::Io(io::ErrorKind::NotFound), what));
+    }
+    serialport::available_ports()
+}
+
 impl Transport for Serial {
     fn read(&mut self, buf: &mut [u8], timeout: Duration) -> io::Result<usize> {
         self.set_timeout(timeout)?;
@@ -132,5 +154,13 @@ mod tests {
         }
         assert!(said(ErrorKind::NoDevice, free).contains("Device Manager"));
         assert!(said(ErrorKind::NoDevice, System::Unix).contains("no such port"));
+    }
+
+    #[test]
+    fn a_system_that_lists_no_ports_is_an_error_and_no_panic() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let none = folder.path().join("none");
+        let error = listed(Some(&none)).expect_err("no such folder").to_string();
+        assert!(error.contains("none") && error.contains("mount /sys"), "{error}");
     }
 }

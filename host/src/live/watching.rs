@@ -311,7 +311,7 @@ fn unix_ms() -> f64 {
 }
 
 /// Free bytes on the file's disk; `None` where the system does not report them.
-fn free_bytes(file: &std::path::Path) -> Option<u64> {
+pub(crate) fn free_bytes(file: &std::path::Path) -> Option<u64> {
     fs4::available_space(file).ok()
 }
 

@@ -15,6 +15,7 @@ mod hysteresis_reference;
 mod identify;
 mod identities;
 mod imported;
+mod kept_files;
 mod line_noise;
 mod malformed;
 mod records;

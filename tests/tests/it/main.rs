@@ -36,6 +36,7 @@ mod report_page;
 mod round_trip;
 mod rows_of_cells;
 mod same_records;
+mod self_test;
 mod sensor_signs;
 mod shaker;
 mod simulated_truth;

@@ -212,3 +212,35 @@ fn a_contact_campaign_with_levels_of_the_shaker_gives_the_same_k_t() {
         assert_eq!(found, wanted, "{format}");
     }
 }
+
+/// The folder that the command of 0.1.0 exported from the kept campaign file of version 3: one of
+/// its records was dropped, so that its samples were not exported.
+#[test]
+fn the_kept_export_of_0_1_0_becomes_the_campaign_that_it_was() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host/tests/data");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("again.jrig");
+    let said = import(&data.join("export_1"), &file);
+    assert!(said.contains("the verdicts and amplitudes are those of the export"), "{said}");
+    let original = samples(&data.join("campaign_v3/old.jrig"));
+    let dropped = 2;
+    let store = Store::open_read_only(&file).unwrap();
+    let rows: Vec<_> = store.records().unwrap().into_iter().flatten().collect();
+    assert_eq!(rows.len(), original.len());
+    for (row, (id, before)) in rows.iter().zip(&original) {
+        assert_eq!(row.id, *id);
+        if row.id == dropped {
+            assert_eq!((row.scans, row.kept()), (0, false));
+        } else {
+            assert!(store.samples(row).unwrap() == *before, "record {id}");
+        }
+    }
+    drop(store);
+    let reasons = |file: &Path| -> Vec<(i64, String)> {
+        let all = Store::open_read_only(file).unwrap().overrules().unwrap();
+        all.into_iter().map(|one| (one.record, one.reason)).collect()
+    };
+    assert_eq!(reasons(&file), [(dropped, "struck twice by eye".to_owned())]);
+    assert_eq!(Store::open_read_only(&file).unwrap().calibrations().unwrap().len(), 1);
+    assert_eq!(Store::open_read_only(&file).unwrap().verify().unwrap(), []);
+}

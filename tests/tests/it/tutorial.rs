@@ -5,6 +5,7 @@ use jointrig_tests::command::jointrig;
 use std::path::Path;
 
 const TUTORIAL: &str = include_str!("../../../docs/tutorial.md");
+const INSTALL: &str = include_str!("../../../docs/install.md");
 const ANOTHER_TOOL: &str = include_str!("../../../examples/another-tool/README.md");
 const FROM_PYFBS: &str = include_str!("../../../docs/coming-from-pyfbs.md");
 
@@ -75,6 +76,13 @@ fn every_command_of_the_tutorial_does_what_the_page_says() {
     let folder = tempfile::tempdir().unwrap();
     let commands = run(TUTORIAL, folder.path());
     assert!(commands >= 12, "{commands} commands");
+}
+
+/// Unpacking an archive and installing a wheel are run by `cargo xtask release --check`.
+#[test]
+fn every_command_of_a_fresh_pc_does_what_the_page_says() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(run(INSTALL, folder.path()), 3);
 }
 
 #[test]

@@ -110,7 +110,7 @@ impl Run {
         let device = Device { address: &address, seed: self.seed, log_tables: self.log_tables };
         let who = Who { stage: self.stage, yes: self.yes, new_structure: self.new_structure, stop };
         let mut judge = Ringing { rings: self.bell };
-        let summary = measure(store, device, who, &mut onlooker, &again, &mut judge)?;
+        let summary = measure(store, device, who, &mut onlooker, Some(&again), &mut judge)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
         }
@@ -203,13 +203,14 @@ pub struct Who {
     pub stop: Arc<AtomicBool>,
 }
 
-/// Measures what is missing in the campaign in `store`. `again` is the command that resumes it.
+/// Measures what is missing in the campaign in `store`. `again` is the command that resumes it, if
+/// it can be resumed.
 pub fn measure(
     store: Store,
     device: Device<'_>,
     who: Who,
     onlooker: &mut Onlooker,
-    again: &str,
+    again: Option<&str>,
     judge: &mut dyn Judge,
 ) -> Result<Summary, CliError> {
     let path = store.path().to_owned();
@@ -242,7 +243,7 @@ fn tell_size(path: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-fn tell(path: &Path, summary: &Summary, again: &str) {
+fn tell(path: &Path, summary: &Summary, again: Option<&str>) {
     let Summary { kept, wanted, hits, given_up, accounts, .. } = summary;
     tell_line!("{}: {kept} of {wanted} good hits kept ({hits} struck in this run)", path.display());
     if *given_up > 0 {
@@ -255,7 +256,9 @@ fn tell(path: &Path, summary: &Summary, again: &str) {
             accounts.unexplained()
         );
     }
-    if summary.interrupted {
+    if summary.interrupted
+        && let Some(again) = again
+    {
         tell_line!("stopped; `{again}` continues from here");
     }
 }
