@@ -175,7 +175,7 @@ fn first_mode(drift_per_hit: f64) -> Value {
     let elastic = include_str!("../../../hil-sim/rigs/elastic.toml");
     let rig = format!("{elastic}\n[contact]\ndrift_per_hit = {drift_per_hit:?}\n");
     std::fs::write(at("rig.toml"), rig).unwrap();
-    let responses = ["A1", "A2", "B1", "B2"];
+    let responses = ["A1", "A2", "A3", "A4", "B1", "B2", "B3", "B4"];
     let cells = jointrig_tests::campaign::plan(2, &[("AJB", &["AZ1", "AY1", "AX1"], &responses)]);
     std::fs::write(at("plan.toml"), cells).unwrap();
     done(jointrig().args(["campaign", "new"]).arg(at("lab.jrig")).arg("--plan").arg(at("plan.toml")));

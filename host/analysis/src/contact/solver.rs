@@ -22,7 +22,7 @@ const STEPS: usize = 60;
 /// Before the noise is widened by the residuals, outlying cells, with too much weight, can keep the
 /// search from converging. It then ends where [`FEW`] steps lower the cost by less than this
 /// fraction. Widening the noise earlier would take for noise what the parameters can still explain.
-const SLOW: f64 = 0.01;
+const SLOW: f64 = 1e-4;
 /// Steps over which [`SLOW`] is judged.
 const FEW: usize = 5;
 /// Convergence: the step changes the compliance by less than this fraction of its standard

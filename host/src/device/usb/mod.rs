@@ -16,7 +16,7 @@ use nusb::descriptors::{InterfaceDescriptor, TransferType};
 use nusb::transfer::{Buffer, Bulk, Direction, In, Out, TransferError};
 use nusb::{Device, Endpoint, ErrorKind, Interface, MaybeFuture};
 
-use super::error::{DeviceError, INSTALL_UDEV_RULE};
+use super::error::{DeviceError, permission_advice};
 use super::transport::Transport;
 pub use attached::{Attached, attached};
 use queue::{Incoming, Queue, TRANSFER_BYTES, broken};
@@ -87,7 +87,7 @@ impl Ends {
 /// A message for a controller that could not be opened.
 fn why(error: &nusb::Error) -> String {
     match error.kind() {
-        ErrorKind::PermissionDenied => format!("permission denied: {INSTALL_UDEV_RULE}"),
+        ErrorKind::PermissionDenied => format!("permission denied: {}", permission_advice()),
         ErrorKind::Busy => {
             "another program holds its vendor interface (another `jointrig`?): end that one, or use \
                             its serial port if both are needed"
