@@ -92,7 +92,7 @@ enum Task {
     /// Write the components of each program: every third-party crate with version, licence and
     /// checksum (CycloneDX).
     Sbom,
-    /// Make and check the files of a release: programs, wheels, firmware, component lists, checksums.
+    /// Make and check the files of a release: programs, wheels, firmware, components, checksums.
     #[command(after_help = setup::ENVIRONMENT_HELP)]
     Release(release::Options),
     /// Compare the numbers of spectra, universal files and virtual points with those of pyFRF,

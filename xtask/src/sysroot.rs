@@ -8,8 +8,9 @@
 //! wrapper is enough. A compiler only reads libraries of its own version, so the folder's name
 //! contains the version.
 //!
-//! It takes about 40 s once for the microcontroller, two minutes for Windows. The work is done in a `.partial` folder under a file lock, and renamed
-//! when complete: a folder with the final name is always complete, even after an interruption.
+//! It takes about 40 s once for the microcontroller, two minutes for Windows. The work is done in a
+//! `.partial` folder under a file lock, and renamed when complete: a folder with the final name is
+//! always complete, even after an interruption.
 
 use crate::command;
 use crate::command::{make_executable, symlink};
@@ -85,6 +86,7 @@ impl Sysroot {
         folder.join("lib/rustlib").join(self.target()).join("lib")
     }
 }
+
 /// Environment variables of the caller that must not affect the build of `core`.
 const FOREIGN: [&str; 7] = [
     "RUSTFLAGS",

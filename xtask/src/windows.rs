@@ -681,7 +681,7 @@ impl Differences {
         }
     }
 
-    /// Tables of numbers with a header. A difference counts in units of the column's largest number.
+    /// Tables of numbers with a header. A difference is relative to the column's largest number.
     fn in_tables(&mut self, place: &str, one: &str, other: &str) {
         let parsed = |table: &str| -> Vec<Vec<Option<f64>>> {
             table

@@ -90,7 +90,7 @@ enum Command {
     Identify(identify::Identify),
     /// Identify natural frequencies, damping and shapes.
     Modes(modes::ModesArgs),
-    /// Test what works on this PC: measuring, analysis, speed, disk, live page, browser, controllers.
+    /// Test what works on this PC: measuring, analysis, disk, live page, browser, controllers.
     SelfTest(self_test::SelfTest),
     /// Print completions for a shell.
     Completions(Completions),

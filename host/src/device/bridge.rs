@@ -164,8 +164,8 @@ fn command_of(line: &str) -> Result<Command, String> {
 }
 
 /// The command line as a command. A program gets its arguments as one text on Windows and splits
-/// them itself, so they are passed on as they were written. Without a shell: ending it would not end
-/// the program.
+/// them itself, so they are passed on as they were written. There is no shell, because ending a
+/// shell would not end the program.
 #[cfg(windows)]
 fn command_of(line: &str) -> Result<Command, String> {
     use std::os::windows::process::CommandExt;

@@ -38,7 +38,7 @@ fn linux_advice(folders: &[&Path]) -> String {
     match installed {
         None => INSTALL_UDEV_RULE.into(),
         Some(rule) if rule == UDEV_RULE => {
-            "the udev rule is installed, and admits whoever is logged in at this PC's screen: unplug the controller \
+            "the udev rule is installed, and permits access to the user at this PC's screen: unplug the controller \
              and plug it in again"
                 .into()
         }

@@ -58,8 +58,8 @@ impl Serial {
     /// Opens `path` and sets DTR, which tells the device that a host is listening.
     ///
     /// # Errors
-    /// [`DeviceError::Open`]; "permission denied" names the udev rule, and on Windows the program to
-    /// look for.
+    /// [`DeviceError::Open`]; where permission is denied it names the udev rule, on Windows another
+    /// program as the cause.
     pub fn open(path: &Path) -> Result<Self, DeviceError> {
         let name = path.display().to_string();
         let timeout = Duration::from_millis(20);

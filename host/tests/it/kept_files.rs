@@ -1,6 +1,6 @@
 //! A kept campaign file of every version: each is read as it is, gives the same samples and
-//! verdicts, and is continued as the newest version. Those of versions 2 and 3 were written by their
-//! programs. That of version 1 is the file of version 2 without the tables that came with version 2
+//! verdicts, and is continued as the newest version. Those of versions 2 and 3 were written by the
+//! programs of their time. That of version 1 is the file of version 2 without the tables that came with version 2
 //! (`chain`, `chain_head`, `temperatures`).
 //!
 //! A release that changes the file's tables adds a file of the version before here, and removes

@@ -77,6 +77,15 @@ struct Posterior<'a> {
     shared: f64,
 }
 
+/// Whether the noise has been widened by the residuals yet.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Widening {
+    /// No: the search ends where it is slow, because the next one moves its end.
+    ToCome,
+    /// Yes: the search ends where it has converged.
+    Begun,
+}
+
 /// How a search begins.
 #[derive(Debug, Clone, Default)]
 pub struct Start {
@@ -144,16 +153,14 @@ fn search(
         searched.hold(*at, *value);
         p[*at] = *value;
     }
-    let settle =
-        |blocks: &[Block], parameters: &Parameters, p: Vec<f64>, motion: Motion, slow: Option<f64>| {
-            Posterior { blocks, parameters, shared }.settle(p, motion, slow)
-        };
     let motion = motions(&blocks, &evaluate(&blocks, &p, None)?);
-    let (mut here, mut settled) = settle(&blocks, &searched, p, motion, Some(SLOW))?;
+    let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
+    let (mut here, mut settled) = posterior.settle(p, motion, Widening::ToCome)?;
     if start.released {
         searched = parameters.clone();
         let motion = motions(&blocks, &here.bins);
-        (here, settled) = settle(&blocks, &searched, here.p, motion, Some(SLOW))?;
+        let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
+        (here, settled) = posterior.settle(here.p, motion, Widening::ToCome)?;
     }
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
@@ -163,7 +170,8 @@ fn search(
             break;
         }
         let motion = motions(&blocks, &here.bins);
-        (here, settled) = settle(&blocks, &searched, here.p, motion, None)?;
+        let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
+        (here, settled) = posterior.settle(here.p, motion, Widening::Begun)?;
     }
     if !settled {
         return Err(not_converged());
@@ -198,22 +206,20 @@ pub fn settled_from(
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
     let motion = motions(blocks, &evaluate(blocks, &p, None)?);
     Posterior { blocks, parameters, shared }
-        .settle(p, motion, None)
+        .settle(p, motion, Widening::Begun)
         .map(|(place, settled)| (place.p, settled))
 }
 
 impl Posterior<'_> {
     /// Steps from `p` to the nearest minimum, with `motion` as that at `p` or near it; the flag
-    /// states whether it converged. With `slow`, it ends where [`FEW`] steps lower the cost by less
-    /// than this fraction.
-    /// The shifts' motion is that of the last accepted point, so the cost of a point is not
-    /// computed with the motion of the next. If a step seems to increase the cost, the current
-    /// point is therefore evaluated again with the new motion.
+    /// states whether it converged. The shifts' motion is that of the last accepted point, so the
+    /// cost of a point is not computed with the motion of the next. If a step seems to increase the
+    /// cost, the current point is therefore evaluated again with the new motion.
     fn settle(
         &self,
         p: Vec<f64>,
         mut motion: Motion,
-        slow: Option<f64>,
+        widening: Widening,
     ) -> Result<(SearchPoint, bool), ContactError> {
         let mut here = self.place(p, &motion)?;
         motion = motions(self.blocks, &here.bins);
@@ -223,8 +229,8 @@ impl Posterior<'_> {
         let mut costs = Vec::new();
         for step in 0..STEPS {
             costs.push(here.cost);
-            let before = step.checked_sub(FEW).map(|before| costs[before]);
-            if slow.zip(before).is_some_and(|(slow, before)| here.cost > before * (1.0 - slow)) {
+            let before = step.checked_sub(FEW).filter(|_| widening == Widening::ToCome);
+            if before.is_some_and(|before| here.cost > costs[before] * (1.0 - SLOW)) {
                 break;
             }
             let (information, gradient) = self.normal(&here);

@@ -56,8 +56,8 @@ def test_a_cluster_of_two_analyses_all_and_their_intervals_hold(campaigns: Path,
         rows = list(csv.DictReader(file))
     assert len(rows) == CAMPAIGNS and len({row["worker"] for row in rows}) == 2
     covered = sum(float(row["ci95_low"]) <= TRUTH <= float(row["ci95_high"]) for row in rows)
-    # of sixteen 95 % intervals, 11 or fewer hold the truth once in a thousand times
-    assert covered >= 12, rows
+    # 95 % of sixteen are fifteen; the seeds are fixed, so that chance decides nothing
+    assert covered >= 14, rows
     assert (tmp_path / "funnel.png").stat().st_size > 10_000
     # one of them by the command, which any other scheduler would call
     told = subprocess.run(

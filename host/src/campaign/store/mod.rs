@@ -28,8 +28,8 @@
 //! links is refused. Where a lock on the campaign file itself can coexist with SQLite's locks
 //! (Linux), that lock is held too, so that removing the lock file does not admit a second writer.
 //!
-//! On Windows the open lock file is itself the lock: it is opened so that nobody else can write,
-//! rename or remove it, but everybody can read the holder's name in it. `LockFileEx` would forbid
+//! On Windows the open lock file is itself the lock: no other program can write, rename or remove
+//! it, but all can read the holder's name in it. `LockFileEx` would forbid
 //! reading too.
 //!
 //! Network shares: SQLite's write-ahead log needs memory shared between processes, which network
@@ -346,7 +346,8 @@ fn connected(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
     }
 }
 
-/// The name under which SQLite opens a file, and the variant of its file access, if not the default.
+/// The name under which SQLite opens a file, and the variant of its file access unless it is the
+/// default.
 #[cfg(not(windows))]
 fn for_sqlite(path: &Path) -> (PathBuf, Option<&'static str>) {
     (path.into(), None)
@@ -528,7 +529,7 @@ fn claimed(path: &Path) -> std::io::Result<Claim> {
     }
 }
 
-/// Opens a lock file so that nobody else can write, rename or remove it. As long as it is open,
+/// Opens a lock file so that no other program can write, rename or remove it. As long as it is open,
 /// this fails in every other process, so no second call is needed to lock it.
 #[cfg(windows)]
 fn claimed(path: &Path) -> std::io::Result<Claim> {
@@ -558,7 +559,7 @@ impl Drop for WriteLock {
         // writer has opened it by then, removing it fails.
         #[cfg(windows)]
         drop(file);
-        // elsewhere it is removed while locked: a process that has already opened it checks for this
+        // elsewhere it is removed while locked: a process that has it open checks for this
         let _ = std::fs::remove_file(&self.path);
         #[cfg(not(windows))]
         let _ = file.map(|file| file.unlock());
