@@ -25,6 +25,7 @@ mod suite;
 mod sysroot;
 mod tests_run;
 mod windows;
+mod windows_wheel;
 
 use clap::{Parser, Subcommand};
 use project::Project;

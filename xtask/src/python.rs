@@ -348,19 +348,23 @@ pub fn build_release(project: &Project, target: &str) -> Result<PathBuf> {
     Ok(wheel)
 }
 
-/// Installs a wheel into an empty environment as a user does, and imports it there.
-pub fn try_out(project: &Project, wheel: &Path, version: &str) -> Result<()> {
+/// An environment without any package, as a user has it first.
+pub fn empty_environment(project: &Project) -> Result<PathBuf> {
     let folder = project.target.join("python/release-user");
     if folder.is_dir() {
         fs::remove_dir_all(&folder).context("the old environment cannot be removed")?;
     }
-    let python = environment(&newest()?, &folder, &[])?;
-    pip(&python, &["install", "--quiet"], &[wheel])?;
+    environment(&newest()?, &folder, &[])
+}
+
+/// Imports the package that was installed in an environment.
+pub fn try_out(python: &Path, version: &str) -> Result<()> {
     let script =
         "import jointrig, importlib.metadata as m; print(jointrig.read_frf.__name__, m.version('jointrig'))";
-    let said = command::output(Command::new(&python).args(["-c", script]).current_dir(&folder))?;
+    let folder = python.parent().context("an interpreter is in a folder")?;
+    let said = command::output(Command::new(python).args(["-c", script]).current_dir(folder))?;
     if said.trim() != format!("read_frf {version}") {
-        bail!("{} is of another version: `{}` instead of {version}", wheel.display(), said.trim());
+        bail!("the wheel is of another version: `{}` instead of {version}", said.trim());
     }
     Ok(())
 }

@@ -17,6 +17,7 @@ use clap::Args;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -144,6 +145,7 @@ impl Release<'_> {
             self.wheel(target)?;
         }
         let sizes = write_sums(&self.folder)?;
+        self.documented_installs()?;
         println!("\nversion {}, in {}:", self.version, self.folder.display());
         for (name, bytes) in sizes {
             println!("  {:>10.3} MB  {name}", bytes as f64 / 1e6);
@@ -196,7 +198,11 @@ impl Release<'_> {
         let unpacked = self.stage("unpacked", &[])?;
         command::run(Command::new("tar").arg("-xf").arg(&archive).arg("-C").arg(&unpacked))
             .with_context(|| format!("{} cannot be unpacked", archive.display()))?;
-        self.try_out(&unpacked.join(name).join(program))
+        let program = unpacked.join(name).join(program);
+        self.states_its_version(&program)?;
+        let mut test = Command::new(program);
+        test.args(["self-test", "--quick", "--folder"]).arg(&self.project.target);
+        command::run(&mut test).context("the program does not pass its own test")
     }
 
     /// Compiles and links the command; returns its path.
@@ -228,15 +234,50 @@ impl Release<'_> {
         Ok(self.project.target.join(target).join("release").join(name))
     }
 
-    /// The built program states its version and passes its own test.
-    fn try_out(&self, program: &Path) -> Result<()> {
+    fn states_its_version(&self, program: &Path) -> Result<()> {
         let said = command::output(Command::new(program).arg("--version"))?;
         if said.trim() != format!("jointrig {}", self.version) {
             bail!("{} says `{}`, and its version is {}", program.display(), said.trim(), self.version);
         }
-        let mut test = Command::new(program);
-        test.args(["self-test", "--quick", "--folder"]).arg(&self.project.target);
-        command::run(&mut test).context("the program does not pass its own test")
+        Ok(())
+    }
+
+    /// The three ways of docs/install.md, by its own commands: a downloaded archive, a downloaded
+    /// wheel, and the sources. Each installs into an empty folder of its own.
+    fn documented_installs(&self) -> Result<()> {
+        if host()? != TARGETS[0] {
+            println!("LEFT OUT: the commands of docs/install.md, which are those of {}", TARGETS[0]);
+            return Ok(());
+        }
+        let page = fs::read_to_string(self.project.root.join("docs/install.md"))
+            .context("could not read docs/install.md")?;
+        let home = self.stage("home", &[])?;
+        let run = |section: &str, folder: &Path, path: &OsStr| -> Result<()> {
+            let commands = commands_of(&page, section)?;
+            println!("docs/install.md, {section}");
+            let mut shell = command::without_own_package("sh");
+            shell.args(["-e", "-x", "-c", &commands]).current_dir(folder);
+            shell.env("HOME", &home).env("PATH", path).env("CARGO_INSTALL_ROOT", home.join("cargo"));
+            shell.env("CARGO_TARGET_DIR", &self.project.target);
+            // found in the user's real home unless they are set
+            for (name, folder) in [("CARGO_HOME", ".cargo"), ("RUSTUP_HOME", ".rustup")] {
+                if std::env::var_os(name).is_none()
+                    && let Some(user) = std::env::home_dir()
+                {
+                    shell.env(name, user.join(folder));
+                }
+            }
+            command::run(&mut shell)
+                .with_context(|| format!("the commands under \"{section}\" of docs/install.md fail"))
+        };
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        run("Download", &self.folder, &path)?;
+        self.states_its_version(&home.join(".local/bin/jointrig"))?;
+        let python = python::empty_environment(self.project)?;
+        run("pip", &self.folder, &python::before_path(&python)?)?;
+        python::try_out(&python, &self.version)?;
+        run("cargo", &self.project.root, &path)?;
+        self.states_its_version(&home.join("cargo/bin/jointrig"))
     }
 
     /// The wheel for one target.
@@ -248,7 +289,9 @@ impl Release<'_> {
             println!("  LEFT OUT: it was not imported, because this machine is not {target}");
             return Ok(());
         }
-        python::try_out(self.project, &wheel, &self.version)
+        let python = python::empty_environment(self.project)?;
+        python::pip(&python, &["install", "--quiet"], &[&wheel])?;
+        python::try_out(&python, &self.version)
     }
 
     /// The component list of the command for one target, compared with what is compiled into it.
@@ -389,6 +432,17 @@ fn compiled(tree: &str) -> BTreeSet<String> {
     lines.map(|line| line.split(' ').take(2).collect::<Vec<_>>().join(" ")).collect()
 }
 
+/// The commands of a section of docs/install.md: its indented lines.
+fn commands_of(page: &str, section: &str) -> Result<String> {
+    let mut own = page.split("\n## ").find(|text| text.lines().next() == Some(section)).map(str::lines);
+    let own = own.as_mut().with_context(|| format!("docs/install.md has no section {section}"))?;
+    let commands: Vec<&str> = own.filter_map(|line| line.strip_prefix("    ")).collect();
+    if commands.is_empty() {
+        bail!("section {section} of docs/install.md has no commands");
+    }
+    Ok(commands.join("\n"))
+}
+
 /// Writes the checksums of all files in a folder; returns their names and sizes.
 fn write_sums(folder: &Path) -> Result<Vec<(String, u64)>> {
     let mut files = Vec::new();
@@ -456,6 +510,14 @@ mod tests {
         let program = b"\0GLIBC_2.2.5\0memcpy\0GLIBC_2.14\0GLIBC_2.9\0GLIBC_PRIVATE\0end GLIBC_2.3";
         assert_eq!(newest_glibc(program), Some((2, 14)));
         assert_eq!(newest_glibc(b"no symbols, GLIBC_"), None);
+    }
+
+    #[test]
+    fn commands_are_those_of_their_section() {
+        let page = include_str!("../../docs/install.md");
+        assert!(commands_of(page, "Download").expect("commands").starts_with("sha256sum --check"));
+        assert_eq!(commands_of(page, "cargo").expect("commands"), "cargo install --path host --locked");
+        assert!(commands_of(page, "Next").is_err() && commands_of(page, "none").is_err());
     }
 
     #[test]

@@ -12,7 +12,7 @@
 use crate::packages::Consent;
 use crate::project::Project;
 use crate::sysroot::{self, Sysroot, WINDOWS};
-use crate::{command, packages, tests_run};
+use crate::{command, packages, tests_run, windows_wheel};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use serde_json::Value;
@@ -28,6 +28,8 @@ const PACKAGES: [&str; 2] = ["gcc-mingw-w64-x86-64-posix", "wine64"];
 const COMPILER: &str = "x86_64-w64-mingw32-gcc-posix";
 /// Where Debian's package puts Wine's loader, which is not on PATH.
 const WINE: &str = "/usr/lib/wine/wine64";
+/// The programs that must compile; the first one is run.
+const PROGRAMS: [&str; 3] = ["jointrig", "jointrig-hil-sim", "xtask"];
 /// The packages whose library tests run in Wine: those that a user of Windows has.
 const TESTED: [&str; 4] = ["jointrig", "jointrig-analysis", "jointrig-protocol", "jointrig-uff"];
 /// The host's own package is compiled without optimisation, which takes a third of the time; what
@@ -74,8 +76,12 @@ pub struct Options {
 enum Only {
     /// Build `jointrig.exe`, and print its path.
     Build,
-    /// Measure and compare, without the library tests, which take longest to build.
+    /// Run the tests of the libraries.
+    Tests,
+    /// Measure on both systems and compare.
     Campaigns,
+    /// Build the Python wheel, and test it with Windows' Python.
+    Wheel,
 }
 
 /// Builds, tests and compares; prints a summary.
@@ -94,54 +100,71 @@ pub fn run(project: &Project, options: &Options) -> Result<()> {
     timed("tools and sysroot", begun);
 
     let since = Instant::now();
-    let tested: &[&str] = if options.only.is_some() { &[] } else { &TESTED };
-    let windows = Programs::for_windows(project, &sysroot, &folder, tested)?;
-    timed("built for Windows", since);
-    if options.only == Some(Only::Build) {
-        println!("  {}", windows.jointrig.display());
-        return Ok(());
-    }
-    let since = Instant::now();
-    let linux = if let Some(built) = &options.against {
-        fs::canonicalize(built).with_context(|| format!("{} does not exist", built.display()))?
-    } else {
-        let mut cargo = command::cargo(&project.root);
-        command::run(cargo.args(["build", "--release", "--workspace", "--bin", "jointrig"]))?;
-        project.target.join("release/jointrig")
-    };
-    timed("built for this system", since);
-
+    let wanted = |part| options.only.is_none_or(|only| only == part);
+    let tested: &[&str] = if wanted(Only::Tests) { &TESTED } else { &[] };
+    let cross = |command: &mut Command| cross_compiling(command, &sysroot, &folder);
+    let windows = Programs::build(project, &folder, cross, tested)?;
+    timed("jointrig, hil-sim, xtask and the tests built for Windows", since);
     let wine = Wine::prepare(&folder)?;
-    if options.only.is_none() {
+    if wanted(Only::Tests) {
         let since = Instant::now();
         let counts = windows.tests(&wine)?;
-        timed(&format!("library tests in Wine: {counts}"), since);
+        timed(&format!("tests in Wine: {counts}"), since);
     }
-
-    let since = Instant::now();
-    let work = folder.join("campaigns");
-    fresh(&work)?;
-    for folder in FOLDERS {
-        fresh(&work.join(folder))?;
-    }
-    let both = Both { project, linux: &linux, windows: &windows.jointrig, wine: &wine, work: &work };
-    let compared = both.campaign()?;
-    timed(&format!("campaign, analysis and export: {compared}"), since);
-    let since = Instant::now();
-    both.refusals()?;
-    both.killed_and_stopped()?;
-    timed("a share and a second writer are refused, a killed and a stopped run are continued", since);
-    if options.demo {
+    if wanted(Only::Wheel) {
         let since = Instant::now();
-        let k_t = both.demo()?;
-        timed(&format!("demo: {k_t}"), since);
+        let wheel = windows_wheel::build(project, &folder, cross)?;
+        let passed = windows_wheel::test(project, &folder, &wheel, &wine, &windows.jointrig)?;
+        timed(&format!("the wheel, tested by Windows' Python in Wine: {passed}"), since);
     }
-    fs::remove_dir_all(&work).with_context(|| format!("could not remove {}", work.display()))?;
+    if wanted(Only::Campaigns) {
+        let since = Instant::now();
+        let linux = if let Some(built) = &options.against {
+            fs::canonicalize(built).with_context(|| format!("{} does not exist", built.display()))?
+        } else {
+            let mut cargo = command::cargo(&project.root);
+            command::run(cargo.args(["build", "--release", "--workspace", "--bin", "jointrig"]))?;
+            project.target.join("release/jointrig")
+        };
+        timed("built for this system", since);
+        let work = folder.join("campaigns");
+        fresh(&work)?;
+        for folder in FOLDERS {
+            fresh(&work.join(folder))?;
+        }
+        let both = Both { project, linux: &linux, windows: &windows.jointrig, wine: &wine, work: &work };
+        let since = Instant::now();
+        let compared = both.campaign()?;
+        timed(&format!("campaign, analysis and export: {compared}"), since);
+        let since = Instant::now();
+        both.refusals()?;
+        both.killed_and_stopped()?;
+        timed("a share and a second writer are refused, a killed and a stopped run are continued", since);
+        if options.demo {
+            let since = Instant::now();
+            let k_t = both.demo()?;
+            timed(&format!("demo: {k_t}"), since);
+        }
+        fs::remove_dir_all(&work).with_context(|| format!("could not remove {}", work.display()))?;
+    }
     println!("\n  Windows, in Wine:");
     for line in &said {
         println!("  - {line}");
     }
+    println!("  jointrig.exe: {}", windows.jointrig.display());
     Ok(())
+}
+
+/// Sets the variables with which cargo compiles for Windows.
+fn cross_compiling(command: &mut Command, sysroot: &Path, folder: &Path) {
+    let target = sysroot::variable_form(WINDOWS);
+    command
+        .env("RUSTC", sysroot::wrapper(sysroot))
+        .env("CARGO_TARGET_DIR", folder)
+        .env(format!("CARGO_TARGET_{target}_LINKER"), COMPILER)
+        .env(format!("CC_{}", target.to_ascii_lowercase()), COMPILER)
+        .env_remove("RUSTC_WRAPPER")
+        .env_remove("RUSTC_WORKSPACE_WRAPPER");
 }
 
 /// What was built for Windows.
@@ -151,27 +174,21 @@ struct Programs {
 }
 
 impl Programs {
-    fn for_windows(project: &Project, sysroot: &Path, folder: &Path, tested: &[&str]) -> Result<Self> {
+    fn build(
+        project: &Project,
+        folder: &Path,
+        cross: impl Fn(&mut Command),
+        tested: &[&str],
+    ) -> Result<Self> {
         let cargo = || {
             let mut cargo = command::cargo(&project.root);
-            let target = sysroot::variable_form(WINDOWS);
-            cargo
-                .env("RUSTC", sysroot::wrapper(sysroot))
-                .env("CARGO_TARGET_DIR", folder)
-                .env(format!("CARGO_TARGET_{target}_LINKER"), COMPILER)
-                .env(format!("CC_{}", target.to_ascii_lowercase()), COMPILER)
-                .env_remove("RUSTC_WRAPPER")
-                .env_remove("RUSTC_WORKSPACE_WRAPPER");
+            cross(&mut cargo);
             cargo
         };
         let selected = ["--release", "--target", WINDOWS, "--config", QUICKLY];
-        command::run(cargo().arg("build").args(selected).args([
-            "--package",
-            "jointrig",
-            "--bin",
-            "jointrig",
-        ]))
-        .context("the host does not compile for Windows")?;
+        let mut build = cargo();
+        build.arg("build").args(selected).args(PROGRAMS.iter().flat_map(|name| ["--bin", name]));
+        command::run(&mut build).context("the host does not compile for Windows")?;
         let mut tests = Vec::new();
         if !tested.is_empty() {
             let mut build = cargo();
@@ -201,7 +218,7 @@ impl Programs {
 }
 
 /// A Windows of our own: its drive, and its registry.
-struct Wine {
+pub struct Wine {
     prefix: PathBuf,
 }
 
@@ -225,7 +242,7 @@ impl Wine {
     }
 
     /// A program for Windows, with the variables of the prefix.
-    fn command(&self, program: &Path) -> Command {
+    pub fn command(&self, program: &Path) -> Command {
         let mut command = command::without_own_package(WINE);
         command.arg(program).env("WINEPREFIX", &self.prefix).env("WINEDEBUG", "-all");
         // neither a window nor an offer to install .NET and a browser
@@ -719,7 +736,7 @@ fn stiffness(results: &Value) -> Option<String> {
 }
 
 /// An empty folder.
-fn fresh(folder: &Path) -> Result<()> {
+pub fn fresh(folder: &Path) -> Result<()> {
     if folder.exists() {
         fs::remove_dir_all(folder).with_context(|| format!("could not remove {}", folder.display()))?;
     }
