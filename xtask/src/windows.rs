@@ -28,7 +28,7 @@ const PACKAGES: [&str; 2] = ["gcc-mingw-w64-x86-64-posix", "wine64"];
 const COMPILER: &str = "x86_64-w64-mingw32-gcc-posix";
 /// Where Debian's package puts Wine's loader, which is not on PATH.
 const WINE: &str = "/usr/lib/wine/wine64";
-/// The programs that must compile; the first one is run.
+/// The programs that must compile, each in the package of its name; the first one is run.
 const PROGRAMS: [&str; 3] = ["jointrig", "jointrig-hil-sim", "xtask"];
 /// The packages whose library tests run in Wine: those that a user of Windows has.
 const TESTED: [&str; 4] = ["jointrig", "jointrig-analysis", "jointrig-protocol", "jointrig-uff"];
@@ -187,7 +187,8 @@ impl Programs {
         };
         let selected = ["--release", "--target", WINDOWS, "--config", QUICKLY];
         let mut build = cargo();
-        build.arg("build").args(selected).args(PROGRAMS.iter().flat_map(|name| ["--bin", name]));
+        build.arg("build").args(selected);
+        build.args(PROGRAMS.iter().flat_map(|name| ["--package", name, "--bin", name]));
         command::run(&mut build).context("the host does not compile for Windows")?;
         let mut tests = Vec::new();
         if !tested.is_empty() {
