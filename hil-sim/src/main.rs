@@ -6,7 +6,6 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use jointrig_hil_sim::board::{Controls, VirtualBoard};
@@ -161,7 +160,7 @@ fn serve_image(
     stand_at(board.controls());
     println!("tcp:{address}");
     // no data comes this way; reading fails when the board ends
-    while link.read(&mut [0; 64], Duration::from_secs(1)).is_ok() {}
+    while link.read(&mut [0; 64], std::time::Duration::from_secs(1)).is_ok() {}
     Err(board.failure().unwrap_or_else(|| "the emulated board has ended".into()).into())
 }
 
