@@ -41,6 +41,7 @@ pub mod band;
 pub mod contact;
 mod errors_in_variables;
 pub mod frf;
+pub mod friction;
 pub mod hysteresis;
 pub mod identified;
 pub mod median;
