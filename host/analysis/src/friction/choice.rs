@@ -5,7 +5,7 @@
 //! better by far. The law to use is the one with the smallest criterion, unless it is refused:
 //! then there is none.
 
-use super::fit::{FittedLoop, LawFit, fit};
+use super::fit::{FittedLaw, FittedLoop, fit};
 use super::law::LawKind;
 use super::{FrictionError, MeasuredLoop};
 use serde::Serialize;
@@ -55,7 +55,7 @@ pub enum LawRefusal {
 pub struct JudgedLaw {
     /// The law.
     #[serde(flatten)]
-    pub fit: LawFit,
+    pub fit: FittedLaw,
     /// Probability among the fitted laws, all equally likely before: exp(−BIC/2), normalised.
     pub weight: f64,
     /// Why it is not accepted; empty if it is.
@@ -92,9 +92,9 @@ pub fn choose(kinds: &[LawKind], loops: &[MeasuredLoop]) -> Result<LawChoice, Fr
     }
     fits.sort_by(|a, b| a.bic.total_cmp(&b.bic));
     let least = fits.first().ok_or(failed)?.bic;
-    let share = |fit: &LawFit| (-0.5 * (fit.bic - least)).exp();
+    let share = |fit: &FittedLaw| (-0.5 * (fit.bic - least)).exp();
     let all: f64 = fits.iter().map(share).sum();
-    let judged = |fit: LawFit| {
+    let judged = |fit: FittedLaw| {
         let mut refusals = refusals(&fit);
         let behind = fit.bic - least;
         if behind > DECISIVE {
@@ -106,9 +106,9 @@ pub fn choose(kinds: &[LawKind], loops: &[MeasuredLoop]) -> Result<LawChoice, Fr
 }
 
 /// What a fit by itself is refused for.
-fn refusals(fit: &LawFit) -> Vec<LawRefusal> {
+fn refusals(fit: &FittedLaw) -> Vec<LawRefusal> {
     let mut found = Vec::new();
-    let LawFit { excess, smooth_excess, .. } = *fit;
+    let FittedLaw { excess, smooth_excess, .. } = *fit;
     if excess > CONTRADICTS || smooth_excess > CONTRADICTS {
         found.push(LawRefusal::Residual { excess, smooth_excess });
     }

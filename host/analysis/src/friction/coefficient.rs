@@ -84,12 +84,12 @@ pub struct SlidingLoop {
 }
 
 /// One stroke: displacement in m and force in N in the direction of motion, from the reversal on.
-struct Stroke {
+struct LoopStroke {
     travel_m: Vec<f64>,
     force_n: Vec<f64>,
 }
 
-impl Stroke {
+impl LoopStroke {
     /// Travel at which the force crosses zero, m.
     fn crossing(&self) -> Option<f64> {
         let at = self.force_n.iter().position(|f| *f > 0.0)?;
@@ -175,7 +175,7 @@ impl FrictionCoefficients {
 
 /// The strokes towards positive and towards negative displacement, with the force relative to the
 /// middle between both at the middle of the stroke: the zero of the load cells is unknown.
-fn strokes(one: &MeasuredLoop) -> Option<[Stroke; 2]> {
+fn strokes(one: &MeasuredLoop) -> Option<[LoopStroke; 2]> {
     let (x, f) = (one.smooth_displacement_m(), one.force_n());
     let n = x.len();
     let (low, high) = one.ends_m();
@@ -196,7 +196,7 @@ fn strokes(one: &MeasuredLoop) -> Option<[Stroke; 2]> {
     let stroke = |indices: &[usize], from: f64, sign: f64| {
         // small motion against the stroke is not travel
         let mut travelled = 0.0f64;
-        Stroke {
+        LoopStroke {
             travel_m: indices
                 .iter()
                 .map(|&i| {
@@ -211,7 +211,7 @@ fn strokes(one: &MeasuredLoop) -> Option<[Stroke; 2]> {
 }
 
 /// Mean force of each third of a stroke's plateau, N.
-fn thirds(stroke: &Stroke, onset_m: f64, stroke_m: f64) -> Option<[f64; 3]> {
+fn thirds(stroke: &LoopStroke, onset_m: f64, stroke_m: f64) -> Option<[f64; 3]> {
     let (travel, force) = stroke.from(onset_m);
     let third = (stroke_m - onset_m) / 3.0;
     let mut found = [0.0; 3];

@@ -28,12 +28,12 @@ pub(super) enum TravelCurve {
         q: f64,
     },
     /// Any other, integrated numerically.
-    Table(Box<Table>),
+    Tabulated(Box<CurveTable>),
 }
 
 /// Nodes of a curve at equal distances [`STEP`] of ζ, cubic between them.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Table {
+pub(super) struct CurveTable {
     /// ζ of the first node.
     first: f64,
     /// v and dv/dζ at each node; v ascends.
@@ -64,7 +64,7 @@ impl TravelCurve {
         nodes.reverse();
         nodes.push((0.0, g(0.0)));
         nodes.extend(side(1.0, ((reach / STEP).ceil().max(1.0) as usize + 1).min(MOST_NODES)));
-        Self::Table(Box::new(Table { first, nodes }))
+        Self::Tabulated(Box::new(CurveTable { first, nodes }))
     }
 
     /// v after a travel of `by` ≥ 0 from `v`.
@@ -99,12 +99,12 @@ impl TravelCurve {
                 }
                 1.0 - (-p).exp()
             }
-            Self::Table(table) => table.at(table.place(v) + by),
+            Self::Tabulated(table) => table.at(table.place(v) + by),
         }
     }
 }
 
-impl Table {
+impl CurveTable {
     fn at(&self, zeta: f64) -> f64 {
         let place = (zeta - self.first) / STEP;
         let cell = (place.floor().max(0.0) as usize).min(self.nodes.len() - 2);

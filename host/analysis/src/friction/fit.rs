@@ -22,7 +22,7 @@ const STARTS: usize = 3;
 const MOST_STEPS: usize = 60;
 
 /// A search ends when a step gains less than this part of the sum of squares.
-const CONVERGED: f64 = 1e-8;
+const CONVERGED: f64 = 1e-6;
 
 /// Step of the differences by the parameters, on their scales.
 const PARAMETER_STEP: f64 = 1e-5;
@@ -33,7 +33,7 @@ const MOTION_STEP: f64 = 1e-5;
 /// A displacement whose noise is below this fraction of its amplitude is taken as exact.
 const EXACT: f64 = 1e-6;
 
-/// Highest harmonic of the residuals in [`LawFit::smooth_excess`]: a wrong law is off along whole
+/// Highest harmonic of the residuals in [`FittedLaw::smooth_excess`]: a wrong law is off along whole
 /// parts of the stroke, noise from point to point.
 const SMOOTH: usize = 15;
 
@@ -78,7 +78,7 @@ pub struct FittedLoop {
 
 /// A law fitted to loops.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LawFit {
+pub struct FittedLaw {
     /// The law.
     #[serde(flatten)]
     pub law: FrictionLaw,
@@ -115,11 +115,11 @@ fn rows<S: Serializer>(matrix: &Option<DMatrix<f64>>, to: S) -> Result<S::Ok, S:
 ///
 /// # Errors
 /// No loops, or none for which the law gives finite forces.
-pub fn fit(kind: LawKind, loops: &[MeasuredLoop]) -> Result<LawFit, FrictionError> {
+pub fn fit(kind: LawKind, loops: &[MeasuredLoop]) -> Result<FittedLaw, FrictionError> {
     if loops.is_empty() {
         return Err(FrictionError::NoLoops);
     }
-    let problem = Problem::new(kind, loops);
+    let problem = LawProblem::new(kind, loops);
     let best = problem
         .starts()
         .into_iter()
@@ -131,7 +131,7 @@ pub fn fit(kind: LawKind, loops: &[MeasuredLoop]) -> Result<LawFit, FrictionErro
 
 /// Residuals of all loops as a function of the unknowns: the parameters on their scales, then of
 /// each loop the mean force over its noise, then the displacement's harmonics over theirs.
-struct Problem<'a> {
+struct LawProblem<'a> {
     kind: LawKind,
     loops: &'a [MeasuredLoop],
     /// Of each loop, its first unknown and the number of its harmonics' unknowns.
@@ -139,7 +139,7 @@ struct Problem<'a> {
     unknowns: usize,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> LawProblem<'a> {
     fn new(kind: LawKind, loops: &'a [MeasuredLoop]) -> Self {
         let mut unknowns = kind.parameters().len();
         let layout = loops
@@ -333,7 +333,7 @@ impl<'a> Problem<'a> {
         Some(sum / force.len() as f64 / one.noise().force_n)
     }
 
-    fn result(&self, at: &DVector<f64>, chi_squared: f64) -> Option<LawFit> {
+    fn result(&self, at: &DVector<f64>, chi_squared: f64) -> Option<FittedLaw> {
         let law = self.law(at.as_slice())?;
         let shared = self.kind.parameters().len();
         let scaled = self.normal(at).and_then(|(matrix, _)| inverse(&matrix, shared));
@@ -377,7 +377,7 @@ impl<'a> Problem<'a> {
                 law_energy_j: area(one.smooth_displacement_m(), &force),
             });
         }
-        Some(LawFit {
+        Some(FittedLaw {
             law,
             parameters,
             covariance,

@@ -407,11 +407,11 @@ pub struct LawState<'a> {
     force_n: f64,
     /// Displacement without force.
     origin_m: f64,
-    memory: Memory,
+    memory: LawMemory,
 }
 
 #[derive(Debug, Clone)]
-enum Memory {
+enum LawMemory {
     /// Turning points (m, N) that are not closed, and the direction of motion.
     Masing { turns: Vec<(f64, f64)>, direction: f64 },
     /// Only the hysteretic force, over its limit.
@@ -423,10 +423,10 @@ impl<'a> LawState<'a> {
     /// distance between the turning points of the path.
     pub fn new(law: &'a FrictionLaw, at_m: f64, swing_m: f64) -> Self {
         let memory = if law.is_masing() {
-            Memory::Masing { turns: Vec::new(), direction: 0.0 }
+            LawMemory::Masing { turns: Vec::new(), direction: 0.0 }
         } else {
             let (slope, limit) = law.parallel_spring();
-            Memory::Last { part: 0.0, curve: law.curve(swing_m), slope, limit }
+            LawMemory::Last { part: 0.0, curve: law.curve(swing_m), slope, limit }
         };
         Self { law, at_m, force_n: 0.0, origin_m: at_m, memory }
     }
@@ -439,7 +439,7 @@ impl<'a> LawState<'a> {
         }
         let towards = by.signum();
         match &mut self.memory {
-            Memory::Masing { turns, direction } => {
+            LawMemory::Masing { turns, direction } => {
                 if *direction == -towards {
                     turns.push((self.at_m, self.force_n));
                 }
@@ -461,7 +461,7 @@ impl<'a> LawState<'a> {
                     None => self.law.backbone(to_m - self.origin_m),
                 };
             }
-            Memory::Last { part, curve, slope, limit } => {
+            LawMemory::Last { part, curve, slope, limit } => {
                 // the travel in units of limit over stiffness, at the slope of zero force
                 let travel = by.abs() * self.law.values[0] / self.law.values[1];
                 *part = towards * curve.after(towards * *part, travel);

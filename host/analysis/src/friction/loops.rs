@@ -128,6 +128,14 @@ impl MeasuredLoop {
         Self::new(thin(displacement_m), thin(force_n), None)
     }
 
+    /// The same loop with an error of the force in addition to its noise, independent from point to
+    /// point, as a fraction of the force's amplitude: what the law or the rig leaves unexplained.
+    #[must_use]
+    pub fn with_force_error(mut self, fraction: f64) -> Self {
+        self.noise.force_n = self.noise.force_n.hypot(fraction * self.force_amplitude_n());
+        self
+    }
+
     /// The average of several cycles of the same number of points (displacement in m, force in N),
     /// with the noise of the average from the scatter of the cycles. What changes slowly from cycle
     /// to cycle is removed before: each cycle's mean.

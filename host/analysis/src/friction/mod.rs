@@ -18,7 +18,7 @@ pub mod loops;
 
 pub use choice::{JudgedLaw, LawChoice, LawRefusal, choose};
 pub use coefficient::{FrictionCoefficients, LoopEnds, SlidingLoop};
-pub use fit::{FittedLoop, FittedParameter, LawFit, fit};
+pub use fit::{FittedLaw, FittedLoop, FittedParameter, fit};
 pub use law::{FrictionLaw, LawKind, LawParameter, LawState, SliderElement};
 pub use loops::{LoopNoise, MeasuredLoop};
 

@@ -184,11 +184,11 @@ fn refusals(kind: LawKind, rigs: usize, seed: u64) -> (Vec<(LawKind, usize)>, us
 #[test]
 fn wrong_laws_are_refused() {
     for (number, kind) in LawKind::ALL.into_iter().enumerate() {
-        let (refused, chosen) = refusals(kind, 3, 300 + number as u64);
+        let (refused, chosen) = refusals(kind, 1, 300 + number as u64);
         for (wrong, count) in refused {
-            assert_eq!(count, 3, "{wrong} for loops of {kind}");
+            assert_eq!(count, 1, "{wrong} for loops of {kind}");
         }
-        assert!(chosen >= 2, "{kind} chosen {chosen} of 3");
+        assert_eq!(chosen, 1, "{kind}");
     }
 }
 
@@ -244,4 +244,18 @@ fn a_right_law_is_accepted_with_noise_estimated_from_the_loop() {
         accepted += usize::from(choose(&[LawKind::Iwan], &loops).expect("a fit").chosen().is_some());
     }
     assert!(accepted >= 38, "{accepted} of 40");
+}
+
+/// Prints `examples/friction-laws/loops.csv`, between two lines of the test's own output.
+#[test]
+#[ignore = "prints the example of docs/friction-laws.md"]
+fn example_loops() {
+    let law = FrictionLaw::new(LawKind::Iwan, &[180e6, 120.0, -0.4, 0.6]).expect("a law");
+    let mut rng = Rng::seed_from_u64(77);
+    println!("\nloop,displacement_m,force_n");
+    for (name, one) in ["small", "middle", "large"].iter().zip(levels(&mut rng, &law, 0.0)) {
+        for (x, f) in one.displacement_m().iter().zip(one.force_n()) {
+            println!("{name},{x:.6e},{f:.4}");
+        }
+    }
 }
