@@ -41,7 +41,8 @@ pub enum LawRefusal {
         /// Energy of the law over the measured one, less 1.
         change: f64,
     },
-    /// The loops do not determine all parameters.
+    /// The loops do not determine all parameters: one of them is not identified, or none
+    /// of the loops dissipates more than three standard deviations of its energy.
     NotDetermined,
     /// Another law explains the loops better by far.
     Evidence {
@@ -121,7 +122,9 @@ fn refusals(fit: &FittedLaw) -> Vec<LawRefusal> {
     if let Some(one) = worst.filter(|one| change(one).abs() > ENERGY) {
         found.push(LawRefusal::Energy { amplitude_m: one.amplitude_m, change: change(one) });
     }
-    if fit.covariance.is_none() {
+    // a limit just below the largest noise would look determined
+    let sticks = fit.loops.iter().all(|one| one.law_energy_j < 3.0 * one.energy_std_j);
+    if sticks || fit.covariance.is_none() || fit.parameters.iter().any(|parameter| !parameter.identified) {
         found.push(LawRefusal::NotDetermined);
     }
     found

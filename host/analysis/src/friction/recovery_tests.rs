@@ -227,6 +227,18 @@ fn loops_of_no_law_have_none() {
     }
 }
 
+/// A contact that sticks has a stiffness, but no law.
+#[test]
+fn loops_that_stick_determine_no_law() {
+    let mut rng = Rng::seed_from_u64(13);
+    let x: Vec<f64> = (0..POINTS).map(|i| 1e-6 * (TAU * i as f64 / POINTS as f64).sin()).collect();
+    let force = x.iter().map(|x| 180e6 * x + 0.5 * normal(&mut rng)).collect();
+    let noise = LoopNoise { displacement_m: 0.0, force_n: 0.5, force_correlation: 0.0 };
+    let stuck = MeasuredLoop::new(x, force, Some(noise)).expect("a loop");
+    let choice = choose(&LawKind::ALL, &[stuck]).expect("fits");
+    assert!(choice.chosen().is_none(), "{:?}", choice.laws[0].fit.law);
+}
+
 /// Loops whose noise is not stated.
 #[test]
 fn a_right_law_is_accepted_with_noise_estimated_from_the_loop() {
