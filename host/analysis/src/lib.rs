@@ -1,5 +1,5 @@
 //! The stiffness of a joint from measurements: impact spectra, frequency-based substructuring,
-//! hysteresis loops.
+//! hysteresis loops, friction laws.
 //!
 //! Input is arrays and geometry, output is numbers: this crate does not access devices, files or
 //! screens. Stiffness is in N/m, time in seconds, and every FRF is on a line s = σ + i2πf.
@@ -33,6 +33,7 @@
 //! - FRFs from the records of a hammer: [`spectra::estimate`](fn@spectra::estimate).
 //! - Modes of a structure from FRFs: [`modes::identify`](fn@modes::identify).
 //! - k_T from a record of a sliding contact: [`hysteresis::analyse`](fn@hysteresis::analyse).
+//! - A friction law from loops: [`friction::choose`].
 //!
 //! The feature `rayon` uses all cores; results are bit-identical with and without it.
 #![forbid(unsafe_code)]
@@ -41,6 +42,7 @@ pub mod band;
 pub mod contact;
 mod errors_in_variables;
 pub mod frf;
+pub mod friction;
 pub mod hysteresis;
 pub mod identified;
 pub mod median;

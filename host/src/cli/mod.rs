@@ -29,6 +29,7 @@ mod hysteresis;
 mod identify;
 mod import;
 mod info;
+mod laws;
 mod modes;
 #[cfg(feature = "dashboard")]
 mod open_page;
@@ -84,6 +85,8 @@ enum Command {
     Frf(frf::FrfArgs),
     /// Compute the hysteresis loops of any time record.
     Hysteresis(hysteresis::Loops),
+    /// Fit friction laws to hysteresis loops.
+    Laws(laws::Laws),
     /// Import FRFs or impact records measured with other systems.
     Import(import::Import),
     /// Identify a joint from any FRFs.
@@ -133,6 +136,7 @@ impl Cli {
             Command::Export(command) => command.run(),
             Command::Frf(command) => command.run(),
             Command::Hysteresis(command) => command.run(),
+            Command::Laws(command) => command.run(),
             Command::Import(command) => command.run(),
             Command::Identify(command) => command.run(),
             Command::Modes(command) => command.run(),

@@ -160,7 +160,7 @@ impl ModesArgs {
 }
 
 /// Whether the file is a campaign: an SQLite database.
-fn is_campaign(path: &Path) -> Result<bool, CliError> {
+pub(super) fn is_campaign(path: &Path) -> Result<bool, CliError> {
     let read = |source| CliError::Read { path: path.into(), doing: "reading", source };
     let mut first = Vec::new();
     std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut first)).map_err(read)?;

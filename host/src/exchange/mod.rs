@@ -18,6 +18,7 @@ pub mod frf_file;
 pub mod frf_npz;
 pub mod frf_uff;
 pub mod labelled_frf;
+pub mod loop_table;
 pub mod modes_output;
 mod npy_header;
 pub mod npz;

@@ -17,6 +17,7 @@ mod faults;
 mod import_folder;
 mod import_follow;
 mod killed;
+mod laws;
 mod level_accuracy;
 mod live_load;
 mod live_measuring;

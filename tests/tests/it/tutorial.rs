@@ -1,12 +1,15 @@
 //! The commands of documentation pages, run one by one as a user would type them.
 #![allow(clippy::unwrap_used)]
 
+use jointrig::friction::loops::area;
+use jointrig::friction::{FrictionLaw, LawKind};
 use jointrig_tests::command::jointrig;
 use std::path::Path;
 
 const TUTORIAL: &str = include_str!("../../../docs/tutorial.md");
 const INSTALL: &str = include_str!("../../../docs/install.md");
 const ANOTHER_TOOL: &str = include_str!("../../../examples/another-tool/README.md");
+const FRICTION_LAWS: &str = include_str!("../../../docs/friction-laws.md");
 const FROM_PYFBS: &str = include_str!("../../../docs/coming-from-pyfbs.md");
 
 /// A fenced block: its kind and its lines.
@@ -98,6 +101,51 @@ fn files_of_another_tool_give_their_joint() {
         }
     }
     assert_eq!(run(ANOTHER_TOOL, folder.path()), 6);
+}
+
+/// The page's example, and the known law of its loops, again from the files that the command wrote.
+#[test]
+fn the_friction_law_of_the_example_is_found_written_and_simulated_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/friction-laws/loops.csv");
+    std::fs::copy(example, folder.path().join("loops.csv")).unwrap();
+    assert_eq!(run(FRICTION_LAWS, folder.path()), 2);
+    let text = std::fs::read_to_string(folder.path().join("law/law.json")).unwrap();
+    let written: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let law = &written["laws"][0];
+    let value = |name: &str| law[name].as_f64().unwrap();
+    let values = ["k_t_n_per_m", "limit_n", "chi", "beta"].map(value);
+    for (number, truth) in [180e6, 120.0, -0.4, 0.6].into_iter().enumerate() {
+        let interval = &law["parameters"][number]["ci95"];
+        let (low, high) = (interval[0].as_f64().unwrap(), interval[1].as_f64().unwrap());
+        assert!(low < truth && truth < high, "{truth}: {interval}");
+    }
+    let law = FrictionLaw::new(LawKind::Iwan, &values).unwrap();
+    let table = |name: &str| -> Vec<Vec<String>> {
+        let mut rows = csv::Reader::from_path(folder.path().join("law").join(name)).unwrap();
+        rows.records().map(|row| row.unwrap().iter().map(String::from).collect()).collect()
+    };
+    let number = |text: &String| text.parse::<f64>().unwrap();
+    let sliders: Vec<[f64; 2]> =
+        table("elements.csv").iter().map(|row| [number(&row[1]), number(&row[5])]).collect();
+    let load: f64 = table("elements.csv").iter().map(|row| number(&row[4])).sum();
+    assert!((load / 400.0 - 1.0).abs() < 1e-9, "{load} N");
+    let points = table("loops.csv");
+    for (place, name) in ["small", "middle", "large"].into_iter().enumerate() {
+        let own: Vec<&Vec<String>> = points.iter().filter(|row| row[0] == name).collect();
+        let x: Vec<f64> = own.iter().map(|row| number(&row[1])).collect();
+        let measured: Vec<f64> = own.iter().map(|row| number(&row[2])).collect();
+        let mut elements = vec![0.0; x.len()];
+        for [k, limit] in &sliders {
+            let one = FrictionLaw::new(LawKind::Jenkins, &[*k, *limit]).unwrap().steady(&x);
+            elements.iter_mut().zip(one).for_each(|(sum, force)| *sum += force);
+        }
+        let energy = area(&x, &measured);
+        let std = written["loops"][place]["energy_std_j"].as_f64().unwrap();
+        for again in [area(&x, &law.steady(&x)), area(&x, &elements)] {
+            assert!((again - energy).abs() < (0.02 * energy).max(3.0 * std), "{name}: {again} of {energy} J");
+        }
+    }
 }
 
 #[test]

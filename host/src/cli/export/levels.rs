@@ -103,7 +103,7 @@ pub(super) fn table(
 }
 
 /// The velocities and the force of a level, aligned in time.
-pub(super) fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
+pub(in crate::cli) fn record(store: &Store, row: &LevelRow) -> Result<HysteresisRecord, CliError> {
     let plan = store.plan()?;
     let channels = plan.along_sliding(store.channels(row.session)?);
     let samples = store.level_samples(row)?;

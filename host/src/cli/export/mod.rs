@@ -30,7 +30,7 @@ use records::Records;
 mod columns;
 #[cfg(feature = "parquet")]
 mod estimates;
-mod levels;
+pub(super) mod levels;
 mod records;
 mod tables;
 
