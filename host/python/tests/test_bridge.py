@@ -66,7 +66,7 @@ def test_a_print_goes_to_standard_error_and_the_stream_stays_whole(program: Path
     run.stdout.read()
     assert run.wait(10) == 0
     said = run.stderr.read().decode()
-    assert said.split("\n")[:4] == ["a print", "a print of another program", "another print", "the end"]
+    assert said.splitlines()[:4] == ["a print", "a print of another program", "another print", "the end"]
 
 
 def test_the_command_reads_it(program: Path) -> None:

@@ -235,6 +235,19 @@ fn write(
 ) -> Result<(), CliError> {
     let failed = |doing| move |source| CliError::File { path: folder.into(), doing, source };
     std::fs::create_dir_all(folder).map_err(failed("making the folder"))?;
+    // those of an earlier run must not pass for this one's
+    for name in ["law.csv", "elements.csv"] {
+        match std::fs::remove_file(folder.join(name)) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(CliError::File {
+                    path: folder.join(name),
+                    doing: "removing the earlier",
+                    source,
+                });
+            }
+            _ => {}
+        }
+    }
     let text = serde_json::to_string_pretty(document)
         .map_err(|error| CliError::Bad(format!("law.json could not be written: {error}")))?;
     std::fs::write(folder.join("law.json"), text + "\n").map_err(failed("writing law.json"))?;
