@@ -26,6 +26,7 @@ mod sysroot;
 mod tests_run;
 mod windows;
 mod windows_wheel;
+mod wine;
 
 use clap::{Parser, Subcommand};
 use project::Project;

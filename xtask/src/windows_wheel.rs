@@ -8,7 +8,7 @@ use crate::command;
 use crate::project::Project;
 use crate::python::{self, FOR_SIZE};
 use crate::sysroot::WINDOWS;
-use crate::windows::{Wine, fresh};
+use crate::wine::{Wine, fresh};
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};

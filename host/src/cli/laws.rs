@@ -35,7 +35,7 @@ pub struct Laws {
     file: PathBuf,
     /// Only these laws: jenkins, mindlin, dahl, valanis, bouc-wen, iwan [default: all].
     #[arg(long = "law", value_name = "NAME", value_delimiter = ',', value_parser = kind)]
-    laws: Vec<LawKind>,
+    kinds: Vec<LawKind>,
     /// Only these levels of a campaign, by their number in levels.csv [default: all at one
     /// frequency, without lost samples].
     #[arg(long = "level", value_name = "NUMBER", value_delimiter = ',')]
@@ -113,7 +113,7 @@ impl Laws {
         }
         let loops: Vec<MeasuredLoop> =
             contact.loops.iter().map(|(_, one)| one.clone().with_force_error(self.force_error)).collect();
-        let kinds = if self.laws.is_empty() { &LawKind::ALL[..] } else { &self.laws[..] };
+        let kinds = if self.kinds.is_empty() { &LawKind::ALL[..] } else { &self.kinds[..] };
         let choice = choose(kinds, &loops).map_err(|error| bad(error.to_string()))?;
         let document = self.document(&contact, &choice);
         if let Some(folder) = &self.out {

@@ -83,13 +83,11 @@ pub fn read_loops(path: &Path) -> Result<Vec<LoopPoints>, LoopTableError> {
         };
         let (x, f) = (value(x, "displacement_m")?, value(f, "force_n")?);
         let own = name.and_then(|at| row.get(at)).unwrap_or("1");
-        let at = match loops.iter().position(|one| one.name == own) {
-            Some(at) => at,
-            None => {
-                loops.push(LoopPoints { name: own.into(), displacement_m: Vec::new(), force_n: Vec::new() });
-                loops.len() - 1
-            }
-        };
+        let known = loops.iter().position(|one| one.name == own);
+        let at = known.unwrap_or_else(|| {
+            loops.push(LoopPoints { name: own.into(), displacement_m: Vec::new(), force_n: Vec::new() });
+            loops.len() - 1
+        });
         loops[at].displacement_m.push(x);
         loops[at].force_n.push(f);
     }
