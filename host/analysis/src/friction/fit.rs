@@ -33,8 +33,8 @@ const MOTION_STEP: f64 = 1e-5;
 /// A displacement whose noise is below this fraction of its amplitude is taken as exact.
 const EXACT: f64 = 1e-6;
 
-/// Highest harmonic of the residuals in [`FittedLaw::smooth_excess`]: a wrong law is off along whole
-/// parts of the stroke, noise from point to point.
+/// Highest harmonic of the residuals in [`FittedLaw::smooth_excess`]: a wrong law is off along
+/// whole parts of the stroke, noise from point to point.
 const SMOOTH: usize = 15;
 
 /// 97.5 % quantile of the normal distribution.

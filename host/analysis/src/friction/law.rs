@@ -1,13 +1,15 @@
 //! The laws, their parameters, and the force along a path of displacements.
 //!
-//! | law | one stroke | source |
-//! |---|---|---|
-//! | Jenkins | a spring up to the limit | Jenkins, J. Appl. Mech. 29 (1962) 1 |
-//! | Mindlin | Y (1 − (1 − 2k\|x\|/3Y)^3/2) | Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953) 327 |
-//! | Iwan | sliders of density R φ^χ below φ_max, and the rest at φ_max | Segalman, J. Appl. Mech. 72 (2005) 752 |
-//! | Dahl | dF/dx = σ (1 − sF/F_C)^i | Dahl, The Aerospace Corporation TOR-0158 (1968) |
-//! | Bouc–Wen | dF/dx = k (1 − \|F/Y\|^n (β sgn(sF) + γ)/(β + γ)) | Wen, J. Eng. Mech. 102 (1976) 249 |
-//! | Valanis | dF/dx = E₀ (1 − w)/(1 − κw), w = s(F − E_t x)/(Y(1 − κE_t/E₀)) | Gaul & Nitsche, Appl. Mech. Rev. 54 (2001) 93 |
+//! One stroke of each:
+//!
+//! - Jenkins: a spring up to the limit (Jenkins, J. Appl. Mech. 29 (1962) 1);
+//! - Mindlin: Y (1 − (1 − 2k|x|/3Y)^3/2) (Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953) 327);
+//! - Iwan: sliders of density R φ^χ below φ_max, and the rest at φ_max (Segalman, J. Appl. Mech. 72
+//!   (2005) 752);
+//! - Dahl: dF/dx = σ (1 − sF/F_C)^i (Dahl, The Aerospace Corporation TOR-0158 (1968));
+//! - Bouc–Wen: dF/dx = k (1 − |F/Y|^n (β sgn(sF) + γ)/(β + γ)) (Wen, J. Eng. Mech. 102 (1976) 249);
+//! - Valanis: dF/dx = E₀ (1 − w)/(1 − κw), w = s(F − E_t x)/(Y(1 − κE_t/E₀)) (Gaul & Nitsche, Appl.
+//!   Mech. Rev. 54 (2001) 93).
 //!
 //! s is the sign of the velocity. The first three follow Masing's rules: after a reversal the
 //! backbone is doubled, a closed inner loop is forgotten, and beyond the largest displacement so
@@ -19,6 +21,7 @@
 
 use super::FrictionError;
 use super::curve::TravelCurve;
+use crate::hysteresis::loops::swing;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -476,12 +479,6 @@ impl<'a> LawState<'a> {
 /// Smallest and largest value.
 pub(super) fn ends(x: &[f64]) -> (f64, f64) {
     x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)))
-}
-
-/// Largest less smallest value.
-pub(super) fn swing(x: &[f64]) -> f64 {
-    let (low, high) = ends(x);
-    high - low
 }
 
 /// The points of a closed path at which its direction changes.

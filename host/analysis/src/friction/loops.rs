@@ -6,7 +6,9 @@
 //! takes part in the fit.
 
 use super::FrictionError;
-use super::law::{ends, swing};
+use super::law::ends;
+use crate::hysteresis::loops::swing;
+use crate::median;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -298,10 +300,9 @@ fn noise_of(signal: &[f64]) -> f64 {
         let at = |by: usize| signal[(i + by) % n];
         (at(3) - 3.0 * at(2) + 3.0 * at(1) - at(0)).abs()
     };
-    let mut differences: Vec<f64> = (0..n).map(third).collect();
-    differences.sort_by(f64::total_cmp);
+    let differences: Vec<f64> = (0..n).map(third).collect();
     // the median of |N(0, 1)| is 0.6745, and the squares of 1, 3, 3, 1 add up to 20
-    differences[n / 2] / (0.6745 * 20f64.sqrt())
+    median::middle(&differences).unwrap_or(f64::NAN) / (0.6745 * 20f64.sqrt())
 }
 
 #[cfg(test)]

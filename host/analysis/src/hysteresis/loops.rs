@@ -109,7 +109,7 @@ pub fn fundamental_stiffness(cycle: &Cycle) -> Complex<f64> {
 }
 
 /// Largest minus smallest value.
-pub(super) fn swing(x: &[f64]) -> f64 {
+pub(crate) fn swing(x: &[f64]) -> f64 {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     high - low
 }
