@@ -34,6 +34,7 @@
 //! - Modes of a structure from FRFs: [`modes::identify`](fn@modes::identify).
 //! - k_T from a record of a sliding contact: [`hysteresis::analyse`](fn@hysteresis::analyse).
 //! - A friction law from loops: [`friction::choose`].
+//! - A quantity over several campaigns, and how much reassembly changes it: [`study::trend`].
 //!
 //! The feature `rayon` uses all cores; results are bit-identical with and without it.
 #![forbid(unsafe_code)]
@@ -50,6 +51,8 @@ pub mod modes;
 mod parallel;
 pub mod spectra;
 pub mod structure;
+mod student;
+pub mod study;
 pub mod substructuring;
 mod vectors;
 

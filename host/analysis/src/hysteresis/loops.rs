@@ -2,6 +2,7 @@
 //! own name, because at 200 Hz near a hidden resonance the peak secant is 213 N/µm where the
 //! least-squares slope is 90 N/µm.
 
+use crate::student::student_95;
 use crate::vectors::dot;
 use num_complex::Complex;
 use serde::Serialize;
@@ -23,8 +24,8 @@ pub struct OverCycles {
     pub ci95: Option<[f64; 2]>,
 }
 
-/// Student's t, two-sided 95 %, for 1…9 degrees of freedom (one less than the blocks).
-const STUDENT_T: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
+/// Most blocks of cycles for the interval of their mean.
+const MOST_BLOCKS: usize = 10;
 
 impl OverCycles {
     /// Statistics of per-cycle values, in order; `None` for an empty list.
@@ -44,14 +45,14 @@ fn interval(values: &[f64], mean: f64) -> Option<[f64; 2]> {
     if n < 4 {
         return None;
     }
-    let blocks = ((n as f64).sqrt().round() as usize).clamp(2, STUDENT_T.len() + 1);
+    let blocks = ((n as f64).sqrt().round() as usize).clamp(2, MOST_BLOCKS);
     let of_block = |b: usize| {
         let own = &values[b * n / blocks..(b + 1) * n / blocks];
         own.iter().sum::<f64>() / own.len() as f64
     };
     let squares: f64 = (0..blocks).map(|b| (of_block(b) - mean).powi(2)).sum();
     let error = (squares / (blocks * (blocks - 1)) as f64).sqrt();
-    let half = STUDENT_T[blocks - 2] * error;
+    let half = student_95(blocks - 1) * error;
     Some([mean - half, mean + half])
 }
 

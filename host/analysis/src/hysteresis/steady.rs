@@ -101,24 +101,24 @@ fn alike(cycles: &[Harmonics]) -> Range<usize> {
     };
     let size = |of: &dyn Fn(&Harmonics) -> f64| middle(&scaled(of, 1.0)).unwrap_or(f64::NAN);
     let (a, r) = (size(&amplitude), size(&|h| ratio(h).norm()));
-    alike_in([scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)])
+    alike_in(&[scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)])
 }
 
 /// As [`alike`], for the amplitudes and both parts of T₁/Δx₁, relative to their medians.
-fn alike_in(series: [Vec<f64>; 3]) -> Range<usize> {
+fn alike_in(series: &[Vec<f64>; 3]) -> Range<usize> {
     let limits = |scatters: [f64; 3]| -> [f64; 3] {
         let least = [ALIKE, ALIKE_RATIO, ALIKE_RATIO];
         std::array::from_fn(|of| least[of].max(SCATTERS * scatters[of]))
     };
     let first = limits(series.each_ref().map(|values| scatter(values)));
-    let used = longest_inside(&series, first);
+    let used = longest_inside(series, first);
     if used.len() == series[0].len() {
         return used;
     }
     // a quartile of few values is uncertain: by chance it can be a third of its expectation, and
     // cycles that are only noisy would then be left out. The cycles found alike give a better value
     let again = limits(series.each_ref().map(|values| scatter_of_alike(&values[used.clone()])));
-    longest_inside(&series, std::array::from_fn(|of| first[of].max(again[of])))
+    longest_inside(series, std::array::from_fn(|of| first[of].max(again[of])))
 }
 
 /// The longest range in which the values of each series span at most its limit.
@@ -605,10 +605,10 @@ mod tests {
                 (0..60).map(|_| 1.0 + std * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect()
             };
             let noise = [values(0.01), values(0.03), values(0.03)];
-            assert_eq!(alike_in(noise.clone()), 0..60, "seed {seed}");
+            assert_eq!(alike_in(&noise), 0..60, "seed {seed}");
             let [mut amplitudes, re, im] = noise;
             amplitudes.iter_mut().enumerate().for_each(|(n, a)| *a -= 0.4 * (-(n as f64) / 3.0).exp());
-            let used = alike_in([amplitudes, re, im]);
+            let used = alike_in(&[amplitudes, re, im]);
             // 12 scatters allow a range of 12 %, of which the noise takes about 5
             assert!(used.start >= 1 && used.len() >= 45, "seed {seed}: {used:?}");
         }

@@ -4,12 +4,15 @@
 use super::idm::{Dof, IdmSet};
 use crate::band::Band;
 use crate::parallel::prelude::*;
+use crate::student::student_95;
 use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// 95 % of a normal distribution lie within this many standard deviations.
-pub const NORMAL_95: f64 = 1.96;
+pub use crate::student::NORMAL_95;
+
+/// Most blocks of the jackknife.
+const MOST_BLOCKS: usize = 10;
 
 /// One quantity over the lines of a band.
 ///
@@ -30,9 +33,6 @@ pub struct BandStatistic {
     pub ci95: Option<[f64; 2]>,
 }
 
-/// Student's t, two-sided 95 %, for 1…9 degrees of freedom (one less than the blocks).
-const STUDENT_T: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
-
 impl BandStatistic {
     /// Statistics of the values of consecutive lines; none without lines.
     pub fn of(values: &[f64]) -> Option<BandStatistic> {
@@ -51,8 +51,8 @@ fn block_jackknife(values: &[f64], mean: f64) -> Option<[f64; 2]> {
     if n < 4 {
         return None;
     }
-    // About √n blocks of about √n lines, at most ten.
-    let blocks = ((n as f64).sqrt().round() as usize).clamp(2, STUDENT_T.len() + 1);
+    // about √n blocks of about √n lines
+    let blocks = ((n as f64).sqrt().round() as usize).clamp(2, MOST_BLOCKS);
     let total: f64 = values.iter().sum();
     let without: Vec<f64> = (0..blocks)
         .map(|b| {
@@ -62,7 +62,7 @@ fn block_jackknife(values: &[f64], mean: f64) -> Option<[f64; 2]> {
         .collect();
     let centre = without.iter().sum::<f64>() / blocks as f64;
     let spread: f64 = without.iter().map(|v| (v - centre).powi(2)).sum();
-    let half = STUDENT_T[blocks - 2] * (spread * (blocks - 1) as f64 / blocks as f64).sqrt();
+    let half = student_95(blocks - 1) * (spread * (blocks - 1) as f64 / blocks as f64).sqrt();
     Some([mean - half, mean + half])
 }
 
