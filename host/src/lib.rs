@@ -9,7 +9,7 @@
 #![forbid(unsafe_code)]
 
 pub use jointrig_analysis::{
-    contact, frf, friction, hysteresis, identified, median, modes, spectra, structure, substructuring,
+    contact, frf, friction, hysteresis, identified, median, modes, spectra, structure, study, substructuring,
 };
 
 mod advice;

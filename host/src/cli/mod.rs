@@ -40,6 +40,7 @@ mod self_test;
 #[cfg(feature = "dashboard")]
 mod serve;
 mod shaker;
+mod trend;
 
 /// Stiffness of a friction joint, measured: impact campaigns, FRFs, substructuring, hysteresis.
 #[derive(Debug, Parser)]
@@ -93,6 +94,8 @@ enum Command {
     Identify(identify::Identify),
     /// Identify natural frequencies, damping and shapes.
     Modes(modes::ModesArgs),
+    /// Fit a quantity of several campaigns over time, load or reassembly.
+    Trend(trend::TrendArgs),
     /// Test what works on this PC: measuring, analysis, disk, live page, browser, controllers.
     SelfTest(self_test::SelfTest),
     /// Print completions for a shell.
@@ -140,6 +143,7 @@ impl Cli {
             Command::Import(command) => command.run(),
             Command::Identify(command) => command.run(),
             Command::Modes(command) => command.run(),
+            Command::Trend(command) => command.run(),
             Command::SelfTest(command) => command.run(),
             Command::Completions(command) => {
                 command.run();

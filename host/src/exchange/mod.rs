@@ -32,6 +32,7 @@ pub mod record_npz;
 pub mod record_uff;
 #[cfg(test)]
 mod round_trip_tests;
+pub mod study_table;
 mod tables;
 pub mod tables_output;
 pub mod typed_table;

@@ -43,6 +43,7 @@ mod shaker;
 mod simulated_truth;
 mod softer_hits;
 mod sync;
+mod trend;
 mod troubleshooting;
 mod tutorial;
 mod wide_channels;
