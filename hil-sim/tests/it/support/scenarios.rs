@@ -8,6 +8,7 @@ use jointrig_protocol::event::{Event, Reason};
 use jointrig_protocol::limits::{COIL_PULSE_CAP_US, SHAKE_RAMP_MS};
 use jointrig_protocol::request::{Configuration, Control, Request, Shake};
 use jointrig_protocol::shot::Phase;
+use std::time::{Duration, Instant};
 
 use super::{PULSE_US, SmallHost};
 
@@ -257,7 +258,7 @@ pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut
     host.start();
     assert_eq!(host.ask(Request::Shake(shake())), Ok(Answer::Done));
     let last_word = controls.seen().scans;
-    silence(host);
+    silence(controls, host);
     let status = host.status();
     assert_eq!((status.shaker, status.drive_v), (Shaker::Resting, 0.0));
     assert!(host.events.contains(&Event::ShakerStops(Reason::LinkLost)), "{:?}", host.events);
@@ -267,15 +268,23 @@ pub fn a_host_that_is_gone_leaves_nothing_moving(controls: &Controls, host: &mut
     let bound = u64::from(RATE / 10 * 13);
     assert!(seen.driven_until > 0 && seen.driven_until < last_word + bound, "{seen:?} after {last_word}");
     assert_eq!(host.ask(Request::Arm { valid_ms: 60_000 }), Ok(Answer::Done));
-    silence(host);
+    silence(controls, host);
     assert_eq!(host.status().hammer, Hammer::Disarmed);
     assert!(host.events.contains(&Event::Disarmed(Reason::LinkLost)), "{:?}", host.events);
     assert!(controls.coil_pulses_us().is_empty());
 }
 
-/// Sends and reads nothing for many seconds of the board's time.
-fn silence(host: &mut SmallHost) {
-    std::thread::sleep(std::time::Duration::from_millis(500));
+/// Sends and reads nothing for three seconds of the board's time, however long these take.
+fn silence(controls: &Controls, host: &mut SmallHost) {
+    let (begun, end) = (Instant::now(), controls.seen().scans + 3 * u64::from(RATE));
+    while controls.seen().scans < end {
+        assert!(
+            begun.elapsed() < Duration::from_mins(2),
+            "the board's time stands still: {:?}",
+            controls.seen()
+        );
+        std::thread::sleep(Duration::from_millis(20));
+    }
     host.pump();
 }
 

@@ -1,8 +1,8 @@
 //! Friction laws: parameters of a contact's law from measured loops, and the loops of a law.
 //!
-//! Processing order: [`loops`] (a measured loop with its noise) → [`fit`] (one law fitted to all
-//! loops of a contact, with covariance) → [`choice`] (which law the loops support, and which they
-//! refuse). [`law`] defines the laws and steps a displacement history to a force history.
+//! Processing order: [`loops`] (a measured loop with its noise) → [`mod@fit`] (one law fitted to
+//! all loops of a contact, with covariance) → [`choice`] (which law the loops support, and which
+//! they refuse). [`law`] defines the laws and steps a displacement history to a force history.
 //! [`coefficient`] reads the three friction coefficients off a loop and says to which ends of the
 //! stroke its plateaus rise.
 //!
