@@ -487,7 +487,7 @@ mod tests {
     }
 
     /// Draws in the tests that count coverage.
-    const FEWER: usize = 1000;
+    const FEWER: usize = 400;
 
     /// How many of 200 intervals with 95 % cover by chance, in 99.9 % of such tests: 190 ± 10.
     const COVERING: std::ops::RangeInclusive<usize> = 180..=199;
