@@ -1,11 +1,11 @@
 //! `cargo xtask windows`: builds the host for Windows on this machine, and runs it in Wine.
 //!
 //! The library tests and those of the Python wheel ([`windows_wheel`]) run there, and a campaign on
-//! the simulated rig: its records must equal this system's, bit for bit. FRFs and results may differ
-//! in the last digits, because sine, exponential and logarithm come from each system's own library;
-//! the largest difference is printed. A second writer, a network share, and a measuring program that
-//! is killed or stopped must be treated as on Linux. What Wine cannot show is listed in
-//! docs/platforms.md.
+//! the simulated rig: its records must equal this system's, bit for bit. FRFs and results may
+//! differ in the last digits, because sine, exponential and logarithm come from each system's own
+//! library; the largest difference is printed. A second writer, a network share, and a measuring
+//! program that is killed or stopped must be treated as on Linux. What Wine cannot show is listed
+//! in docs/platforms.md.
 //!
 //! rustup is not used: the compiler and its sources are Debian's ([`sysroot`]), the linker is
 //! mingw's, Wine is the distribution's. All of it lies below `target/windows`.

@@ -32,8 +32,8 @@ const LEFT_OUT: [&str; 6] = [
     // use fork and sysconf, which Windows does not have
     "--deselect=test_lab.py::test_spawned_processes_work_and_forked_ones_are_refused_in_words",
     "--deselect=test_lab.py::test_reading_two_thousand_records_takes_no_more_memory_than_reading_twenty",
-    // `jointrig.exe` is built without optimisation here and the wheel with it: one of 65 288 numbers
-    // differs, by 3e-15
+    // `jointrig.exe` is built without optimisation here and the wheel with it: one of 65 288
+    // numbers differs, by 3e-15
     "--deselect=test_lab.py::test_the_analysis_is_the_commands",
 ];
 

@@ -1,9 +1,9 @@
 //! Studies of several campaigns: how a quantity depends on a covariate, and how much it varies
 //! between reassemblies and within one.
 //!
-//! Model: y_i = level + slope (x_i − x̄) + b_g(i) + w_i + m_i, where m_i is the campaign's own error,
-//! whose variance is known, w_i the variation within a reassembly and b_g that between
-//! reassemblies, all normally distributed and independent. An error that all campaigns share (the
+//! Model: y_i = level + slope (x_i − x̄) + b_g(i) + w_i + m_i. m_i is the campaign's own error, whose
+//! variance is known, w_i the variation within a reassembly and b_g that between reassemblies, all
+//! normally distributed and independent. An error that all campaigns share (the
 //! same spots, the same calibration) moves the level only.
 //!
 //! The two unknown variances are estimated by REML. Intervals come from generalised pivotal
@@ -18,7 +18,6 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::Serialize;
 
 /// Draws of the pivotal quantities.
 const DRAWS: usize = 4000;
@@ -65,30 +64,26 @@ pub enum StudyError {
     },
 }
 
-/// A standard deviation with its interval.
-pub type Scatter = Interval;
-
 /// The dependence of a quantity on a covariate.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Trend {
     /// The value at [`Trend::at`]; its interval includes the shared error.
     pub level: Interval,
     /// Mean of the covariate.
     pub at: f64,
-    /// Change of the value per unit of the covariate; null if all covariates are equal, or if too
-    /// few campaigns differ in it.
+    /// Change of the value per unit of the covariate; none if all covariates are equal, or if
+    /// too few campaigns differ in it.
     pub slope: Option<Interval>,
-    /// Standard deviation between reassemblies; null if there is only one.
-    pub between: Option<Scatter>,
-    /// Standard deviation between campaigns of one reassembly, beyond their own errors; null if no
+    /// Standard deviation between reassemblies; none if there is only one.
+    pub between: Option<Interval>,
+    /// Standard deviation between campaigns of one reassembly, beyond their own errors; none if no
     /// reassembly has two campaigns: then it is part of `between`.
-    pub within: Option<Scatter>,
+    pub within: Option<Interval>,
     /// Number of campaigns.
     pub campaigns: usize,
     /// Number of reassemblies.
     pub groups: usize,
     /// Level and slope of each draw, for [`Trend::line`].
-    #[serde(skip)]
     drawn: Vec<[f64; 2]>,
     /// Standard deviation of the shared error.
     shared_std: f64,
@@ -118,7 +113,7 @@ struct Variances {
 struct Solved {
     /// Level and slope.
     estimate: [f64; 2],
-    /// Lower triangle of the Cholesky factor of their covariance.
+    /// Entries (0, 0), (0, 1) and (1, 1) of R, where R Rᵀ is their covariance.
     root: [f64; 3],
     /// yᵀ P y: the weighted sum of squares of the residuals.
     squares: f64,
@@ -211,7 +206,7 @@ impl Grouped {
                 yy += w * y * y;
             }
         }
-        // Cholesky factor of the information, and of its inverse
+        // Cholesky factor of the information
         let l0 = information[0].sqrt();
         let estimate;
         let root;
@@ -221,7 +216,7 @@ impl Grouped {
             let (a, b) = (right[0] / l0, (right[1] - right[0] / l0 * l1) / l2);
             let slope = b / l2;
             estimate = [(a - l1 * slope) / l0, slope];
-            // level and slope of two independent unit values: L⁻ᵀ z
+            // L⁻ᵀ, for the information L Lᵀ
             root = [l0.recip(), -l1 / (l0 * l2), l2.recip()];
             yy -= a * a + b * b;
             log += 2.0 * (l0.ln() + l2.ln());
@@ -249,7 +244,7 @@ impl Grouped {
         let mut step = 2.0 * scale / f64::from(POINTS);
         let mut centre = [scale, scale];
         let half = POINTS / 2;
-        // the last step is 1e-6 of the values' scatter
+        // the last step is below 1e-6 of the values' scatter
         while step > 1e-7 * scale {
             for i in -half..=half {
                 for j in -half..=half {
@@ -431,7 +426,7 @@ impl Trend {
     /// to be within ± `half_width`; `None` if the shared error alone is larger, or if more than a
     /// thousand would be needed.
     pub fn reassemblies_for(&self, half_width: f64, each: usize) -> Option<usize> {
-        let variance = |scatter: Option<Scatter>| scatter.map_or(0.0, |s| s.mean * s.mean);
+        let variance = |scatter: Option<Interval>| scatter.map_or(0.0, |s| s.mean * s.mean);
         let own = (variance(self.within) + self.own_variance) / each.max(1) as f64;
         let of_one = variance(self.between) + own;
         (2..=MOST_GROUPS).find(|groups| {
@@ -558,8 +553,8 @@ mod tests {
         }
     }
 
-    /// 20 campaigns over which the contact changes by 5 % and scatters by 1 %, of which 1.5 % are
-    /// known; and the same without a change.
+    /// 20 campaigns over which the contact changes by 5 %, with a scatter of 1 % and own errors of 1
+    /// and 1.5 %; and the same without a change.
     #[test]
     fn a_drift_is_found_and_none_is_invented() {
         let kind = |slope| Drawn {
@@ -615,7 +610,7 @@ mod tests {
             let between = squares(&means) / 6.0 - within / 5.0;
             assert!(found.slope.is_none() && between > 0.0);
             // the grid's last step
-            let near = |found: Option<Scatter>, variance: f64| {
+            let near = |found: Option<Interval>, variance: f64| {
                 (found.expect("identified").mean / variance.sqrt() - 1.0).abs() < 1e-4
             };
             assert!(near(found.between, between) && near(found.within, within), "seed {seed}: {found:?}");
@@ -672,7 +667,7 @@ mod tests {
         assert!(needed >= 2 && more > needed, "{needed} {more}");
         // the number stated is the smallest one
         let half = |groups: usize| {
-            let square = |of: Option<Scatter>| of.map_or(0.0, |s| s.mean * s.mean);
+            let square = |of: Option<Interval>| of.map_or(0.0, |s| s.mean * s.mean);
             let one = square(alone.between) + square(alone.within) + 1e-4;
             student_95(groups - 1) * (one / groups as f64).sqrt()
         };

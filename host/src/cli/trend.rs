@@ -10,6 +10,7 @@ use crate::campaign::store::Store;
 use crate::contact::Interval;
 use crate::exchange::study_table::{StudyTable, read_study};
 use crate::exchange::tables_output::write_rows;
+use crate::report;
 use crate::study::{Observation, Trend, trend};
 use crate::substructuring::joint_over_bands::NORMAL_95;
 use crate::untrusted_input;
@@ -18,7 +19,7 @@ use clap::{Args, ValueEnum};
 use jiff::Timestamp;
 use serde::Serialize;
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Largest results.json, bytes: with all curves, that of the paper's campaign has 15 MB.
@@ -172,13 +173,22 @@ impl TrendArgs {
         let mut left_out = BTreeMap::new();
         let mut campaigns = Vec::new();
         let mut started = Vec::new();
+        let mut given = BTreeSet::new();
         for path in &self.files {
             let results = results_of(path)?;
             let name = name_of(path, &results);
+            let begun = started_at(&results);
+            // twice the same campaign would count as two independent ones
+            if !given.insert((name.clone(), begun)) {
+                return Err(CliError::Bad(format!(
+                    "{}: the campaign {name} is given twice: leave one of them out",
+                    path.display()
+                )));
+            }
             match self.campaign(&name, &results, table.as_ref()) {
                 Ok(one) => {
                     campaigns.push(one);
-                    started.push(started_at(&results));
+                    started.push(begun);
                 }
                 Err(why) => {
                     tell_line!("jointrig: left out: {name}: {why}");
@@ -198,10 +208,9 @@ impl TrendArgs {
                 one.covariate = Some(started.duration_since(first).as_secs_f64() / DAY_S);
             }
         }
-        let wrong = |error: &dyn std::fmt::Display| CliError::Bad(format!("trend: {error}"));
         let observations = self.observations(&campaigns)?;
         let shared = campaigns.iter().map(|one| one.shared_std).fold(0.0, f64::max);
-        let found = trend(&observations, shared).map_err(|error| wrong(&error))?;
+        let found = trend(&observations, shared).map_err(|error| CliError::Bad(format!("trend: {error}")))?;
         let document = self.document(&found, &observations, shared, &campaigns, &left_out);
         if let Some(folder) = &self.out {
             self.write(folder, &document, &found, &observations)?;
@@ -335,7 +344,8 @@ impl TrendArgs {
         std::fs::create_dir_all(folder).map_err(failed("making the folder"))?;
         let text = serde_json::to_string_pretty(document)
             .map_err(|error| CliError::Bad(format!("trend.json could not be written: {error}")))?;
-        std::fs::write(folder.join("trend.json"), text + "\n").map_err(failed("writing trend.json"))?;
+        report::write_whole(&folder.join("trend.json"), (text + "\n").as_bytes())
+            .map_err(failed("writing trend.json"))?;
         let field = self.of.field();
         let mut rows = vec![vec![
             "file".to_owned(),

@@ -127,6 +127,7 @@ fn errors_say_what_where_and_what_to_do() {
         ),
         (&["--against", "mass", "--table", "study.csv"], 1, &["no column `mass`", "load_n"]),
         (&["frf.json"], 1, &["frf.json", "jointrig analyse"]),
+        (&["00.json"], 1, &["00.json", "00.jrig is given twice"]),
         (&["--power-law"], 2, &["--against"]),
         (&["--reassembly", "set"], 2, &["--table"]),
         (&["--within", "0"], 2, &["write a number over 0"]),
