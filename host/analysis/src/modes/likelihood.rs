@@ -152,6 +152,7 @@ impl Evaluation {
 
     /// As [`Evaluation::new`]; `basis` may have more columns than the model, for their gradient.
     fn with_basis(data: &Data, model: Model, basis: DMatrix<f64>) -> Evaluation {
+        let transposed = basis.transpose();
         let of_output = |o: usize| {
             let mut left = residuals_of(data, &model, &basis, o);
             let mut weighted = left.clone();
@@ -161,7 +162,7 @@ impl Evaluation {
                 re.component_mul_assign(&weight);
                 im.component_mul_assign(&weight);
             }
-            let gradient = transposed_times(&basis, &weighted);
+            let gradient = &transposed * &weighted;
             left.component_mul_assign(&weighted);
             (gradient, left.sum())
         };
@@ -218,21 +219,34 @@ fn residuals_of(data: &Data, model: &Model, basis: &DMatrix<f64>, output: usize)
 /// matrix would be better and slower to compute. Weights are averages over ±10 Hz already.
 const SEGMENTS: usize = 256;
 
-/// Inner products of the basis' columns, one column per segment of lines, upper triangle packed.
+/// Inner products of the basis' columns, one column per segment of lines, upper triangle packed,
+/// and the bounds of the segments.
+///
+/// A segment has few lines, for which a matrix product spends its time on anything but products.
 fn inner_products(basis: &DMatrix<f64>, lines: usize) -> (DMatrix<f64>, Vec<(usize, usize)>) {
     let segments = lines.min(SEGMENTS);
     let bounds: Vec<(usize, usize)> =
         (0..segments).map(|k| (k * lines / segments, (k + 1) * lines / segments)).collect();
     let columns = basis.ncols();
+    let (packed_length, by_line) = (columns * (columns + 1) / 2, basis.transpose());
     let of_segment = |&(from, to): &(usize, usize)| {
-        let (re, im) = (basis.rows(from, to - from), basis.rows(lines + from, to - from));
-        let product = re.transpose() * re + im.transpose() * im;
-        let packed: Vec<f64> =
-            (0..columns).flat_map(|c| (0..=c).map(move |r| (r, c))).map(|at| product[at]).collect();
+        let mut packed = vec![0.0; packed_length];
+        for line in from..to {
+            let (re, im) = (by_line.column(line), by_line.column(lines + line));
+            let (re, im) = (re.as_slice(), im.as_slice());
+            let mut rest = packed.as_mut_slice();
+            for c in 0..columns {
+                let (column, after) = rest.split_at_mut(c + 1);
+                for ((sum, re_r), im_r) in column.iter_mut().zip(re).zip(im) {
+                    *sum += re[c] * re_r + im[c] * im_r;
+                }
+                rest = after;
+            }
+        }
         packed
     };
     let packed: Vec<Vec<f64>> = bounds.par_iter().map(of_segment).collect();
-    (DMatrix::from_vec(columns * (columns + 1) / 2, segments, packed.concat()), bounds)
+    (DMatrix::from_vec(packed_length, segments, packed.concat()), bounds)
 }
 
 /// The residual terms of one cell: factors of their own block, their coupling to the other columns,
