@@ -1,6 +1,7 @@
 """A small campaign on the simulated rig, measured once by the command."""
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 JOINTRIG = os.environ["JOINTRIG_BIN"]
 # FRFs and records that the command's own tests use
 DATA = Path(__file__).parents[2] / "tests" / "data"
+# good hits of `short_contact_plan`
+HITS = 42
 
 
 def command(*arguments: object, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -37,20 +40,34 @@ def plan_of_one_place(path: Path, changes: list[tuple[str, str]]) -> Path:
     return path
 
 
-def measured(folder: Path, template: str) -> Path:
-    """A campaign of one of the plans that come with jointrig."""
+def short_contact_plan(path: Path) -> Path:
+    """The plan for a contact's own stiffness with fewer cells, two hits in each, of one second: HITS in all."""
+    command("plan", "new", path, "--template", "contact")
+    text = path.read_text()
+    text = re.sub(r'impacts = \["BZ1".*\]', 'impacts = ["BZ1", "BZ2", "BZ3"]', text)
+    cells = 'impacts = ["AZ1", "AZ3"]\nresponses = ["C1", "C2", "C3", "B1", "B2", "BL"]'
+    text = re.sub(r'impacts = \["AZ1".*\]\nresponses = .*', cells, text)
+    text = text.replace("wanted = 3", "wanted = 2").replace("length_s = 2.0", "length_s = 1.0")
+    path.write_text(text.replace("exponential_per_s = 2.3", "exponential_per_s = 4.6"))
+    return path
+
+
+def measured(folder: Path, plan: Path) -> Path:
+    """A campaign on the simulated rig."""
     file = folder / "lab.jrig"
-    command("plan", "new", folder / "plan.toml", "--template", template)
-    command("campaign", "new", file, "--plan", folder / "plan.toml")
+    command("campaign", "new", file, "--plan", plan)
     command("campaign", "run", file, "--device", "sim:", "--yes")
     return file
 
 
 @pytest.fixture(scope="session")
 def lab_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return measured(tmp_path_factory.mktemp("contact"), "contact")
+    folder = tmp_path_factory.mktemp("contact")
+    return measured(folder, short_contact_plan(folder / "plan.toml"))
 
 
 @pytest.fixture(scope="session")
 def small_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return measured(tmp_path_factory.mktemp("small"), "small")
+    folder = tmp_path_factory.mktemp("small")
+    command("plan", "new", folder / "plan.toml", "--template", "small")
+    return measured(folder, folder / "plan.toml")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 
-from conftest import DATA, command
+from conftest import DATA, HITS, command
 
 DOCS = Path(__file__).parents[4] / "docs"
 
@@ -58,8 +58,8 @@ def test_the_queries_on_columns(lab_file: Path, tmp_path: Path, monkeypatch) -> 
     command("export", lab_file, "--format", "parquet", "--out", tmp_path / "columns")
     monkeypatch.chdir(tmp_path)
     peaks, verdicts, frf = (duckdb.sql(query).fetchall() for query in fenced("columns.md", "sql"))
-    assert len(peaks) == 201 and all(5 < peak < 500 for _, peak in peaks)
-    assert verdicts[0][:2] == ("good", 201) and verdicts[0][2]
+    assert len(peaks) == HITS and all(5 < peak < 500 for _, peak in peaks)
+    assert verdicts[0][:2] == ("good", HITS) and verdicts[0][2]
     assert len(frf) > 1000 and all(magnitude > 0 for _, magnitude, _ in frf)
     told = run(blocks("columns.md"), tmp_path)
     assert "AZ1" in told and "peak_n" in told

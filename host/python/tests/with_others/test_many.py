@@ -2,7 +2,6 @@
 
 import csv
 import os
-import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import JOINTRIG, command
+from conftest import JOINTRIG, command, short_contact_plan
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 CAMPAIGNS = 16
@@ -22,12 +21,7 @@ TRUTH = 180e6
 def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Forty-two hits each, half of them with a softer hammer, and each with other noise, aims and sensors' errors."""
     folder = tmp_path_factory.mktemp("many")
-    command("plan", "new", folder / "plan.toml", "--template", "contact")
-    text = (folder / "plan.toml").read_text()
-    text = re.sub(r'impacts = \["BZ1".*\]', 'impacts = ["BZ1", "BZ2", "BZ3"]', text)
-    text = re.sub(r'impacts = \["AZ1".*\]\nresponses = .*', 'impacts = ["AZ1", "AZ3"]\nresponses = ["C1", "C2", "C3", "B1", "B2", "BL"]', text)
-    text = text.replace("wanted = 3", "wanted = 2").replace("length_s = 2.0", "length_s = 1.0").replace("exponential_per_s = 2.3", "exponential_per_s = 4.6")
-    (folder / "plan.toml").write_text(text)
+    text = short_contact_plan(folder / "plan.toml").read_text()
     softer = text.replace("target_n = 50.0", "target_n = 25.0").replace("weak_n = 30.0", "weak_n = 12.0")
     (folder / "softer.toml").write_text(softer)
 
