@@ -38,17 +38,29 @@ pub fn small_plan(cells: &[(&str, &[&str], &[&str])]) -> String {
     with_cells(include_str!("../../docs/plans/small.toml"), cells)
 }
 
+/// The plan with records of one second instead of two, and the window that belongs to them: half the
+/// samples to simulate, store and transform, for tests of something else than accuracy.
+#[must_use]
+pub fn one_second(plan: &str) -> String {
+    let mut text = plan.to_owned();
+    for (old, new) in
+        [("length_s = 2.0", "length_s = 1.0"), ("exponential_per_s = 2.3", "exponential_per_s = 4.6")]
+    {
+        assert!(text.contains(old), "{old}");
+        text = text.replace(old, new);
+    }
+    text
+}
+
 /// The contact plan with 42 hits of one second.
 #[must_use]
 pub fn short_contact_plan() -> String {
-    let mut text = CONTACT.to_owned();
+    let mut text = one_second(CONTACT);
     for (old, new) in [
         ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
         ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\", \"I_MZ\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
         ("\"C4\", \"D1\", \"D2\", \"D3\", \"B1\"", "\"B1\""),
         ("wanted = 3", "wanted = 2"),
-        ("length_s = 2.0", "length_s = 1.0"),
-        ("exponential_per_s = 2.3", "exponential_per_s = 4.6"),
     ] {
         assert!(text.contains(old), "{old}");
         text = text.replace(old, new);

@@ -1,6 +1,8 @@
 //! Comparison of two campaigns: with a contact that was changed, and with one that was not.
 #![allow(clippy::unwrap_used)]
 
+use jointrig::campaign::plan::CONTACT;
+use jointrig_tests::campaign::one_second;
 use jointrig_tests::command::jointrig;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -20,7 +22,7 @@ fn measured(folder: &Path, k_t: f64, seed: u64) -> PathBuf {
     let contact = format!("name = \"own-{k_t}\"\n[contact]\nstiffness_n_per_m = [1.8e8, 2.6e8, {k_t}e6]\n");
     std::fs::write(&rig, contact).unwrap();
     let plan = folder.join(format!("plan-{seed}.toml"));
-    std::fs::write(&plan, include_str!("../../../docs/plans/contact.toml")).unwrap();
+    std::fs::write(&plan, one_second(CONTACT)).unwrap();
     done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
     let device = format!("sim:{}", rig.display());
     done(

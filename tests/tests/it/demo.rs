@@ -3,13 +3,14 @@
 
 use std::path::Path;
 
+use jointrig_tests::campaign::one_second;
 use jointrig_tests::command::jointrig;
+use jointrig_tests::live::{campaign, done};
 use serde_json::Value;
 
 /// Runs the demo and returns its results.
-fn demo(out: &Path, arguments: &[&str]) -> Value {
-    let run =
-        jointrig().arg("demo").arg("--out").arg(out).args(["--seed", "7"]).args(arguments).output().unwrap();
+fn demo(out: &Path) -> Value {
+    let run = jointrig().arg("demo").arg("--out").arg(out).args(["--seed", "7"]).output().unwrap();
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
     assert!(out.join("report.html").is_file() && out.join("campaign.jrig").is_file());
     serde_json::from_str(&std::fs::read_to_string(out.join("results.json")).unwrap()).unwrap()
@@ -31,7 +32,7 @@ fn sliding_stiffness(results: &Value, method: &str) -> f64 {
 #[test]
 fn the_simulated_rig_shows_clamp_and_contact_in_series() {
     let folder = tempfile::tempdir().unwrap();
-    let results = demo(folder.path(), &[]);
+    let results = demo(folder.path());
     let k = sliding_stiffness(&results, "internal");
     assert!((22.0..31.0).contains(&k), "{k} N/µm");
     let checks = results["checks"].as_array().unwrap();
@@ -50,12 +51,16 @@ fn the_simulated_rig_shows_clamp_and_contact_in_series() {
 }
 
 /// With a rigid clamp and no position errors, substructuring finds the contact itself: 180 N/µm
-/// within 5 %.
+/// within 5 %. The plan is the demo's, with shorter records.
 #[test]
 fn the_rigid_clamp_shows_the_contact() {
-    let folder = tempfile::tempdir().unwrap();
+    let (folder, file) = campaign(&one_second(include_str!("../../../docs/plans/demo.toml")));
     let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hil-sim/rigs/rigid-clamp.toml");
-    let results = demo(folder.path(), &["--rig", rig.to_str().unwrap()]);
+    let device = format!("sim:{}", rig.display());
+    done(jointrig().args(["campaign", "run", "--yes", "--seed", "7", "--device", &device]).arg(&file));
+    done(jointrig().arg("analyse").arg(&file).arg("--out").arg(folder.path()));
+    let results: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("results.json")).unwrap()).unwrap();
     let k = sliding_stiffness(&results, "internal");
     assert!((k / 180.0 - 1.0).abs() < 0.05, "{k} N/µm");
     // only noise changes these lines, and its size is the noise reported for each: the median of

@@ -1,6 +1,6 @@
 //! A campaign that is killed repeatedly loses nothing, and ends like an undisturbed one.
 //!
-//! `JOINTRIG_KILLS` sets how often it is killed (50), `JOINTRIG_SEED` repeats the kill times of an
+//! `JOINTRIG_KILLS` sets how often it is killed (25), `JOINTRIG_SEED` repeats the kill times of an
 //! earlier run.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
@@ -67,7 +67,7 @@ fn killed_at_random_instants_it_ends_as_if_undisturbed() {
     let takes = begun.elapsed();
     let undisturbed = content(&whole);
 
-    let kills = number("JOINTRIG_KILLS").unwrap_or(50);
+    let kills = number("JOINTRIG_KILLS").unwrap_or(25);
     let seed = number("JOINTRIG_SEED").unwrap_or_else(|| {
         std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().subsec_nanos().into()
     });

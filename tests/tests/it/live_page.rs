@@ -8,7 +8,7 @@ use jointrig::campaign::store::session_table::Counters;
 use jointrig::campaign::verdict::{Judgement, Verdict};
 use jointrig::device::stream::Recording;
 use jointrig_tests::browser::{Browser, Look, Page};
-use jointrig_tests::campaign::{origins, rows};
+use jointrig_tests::campaign::{origins, rows, short_contact_plan};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::live::{self, Served, done, picture};
 use serde_json::Value;
@@ -21,7 +21,7 @@ use tempfile::TempDir;
 
 /// A new campaign of a few cells on B and the assembly.
 fn campaign() -> (TempDir, PathBuf) {
-    live::campaign(include_str!("../../../docs/plans/contact.toml"))
+    live::campaign(&short_contact_plan())
 }
 
 /// The same with every number as a float: a browser writes 100.0 as 100.

@@ -5,6 +5,7 @@
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use jointrig_tests::browser::{Browser, Look, Page};
+use jointrig_tests::campaign::one_second;
 use jointrig_tests::command::jointrig;
 use jointrig_tests::origins;
 use serde_json::Value;
@@ -26,7 +27,7 @@ fn campaign() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        let plan = include_str!("../../../docs/plans/demo.toml")
+        let plan = one_second(include_str!("../../../docs/plans/demo.toml"))
             .replace("wanted = 3", "wanted = 2")
             .replace("minimum = 3", "minimum = 2");
         let (plan_file, file) = (folder.path().join("plan.toml"), folder.path().join("campaign.jrig"));

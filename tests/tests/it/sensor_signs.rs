@@ -7,7 +7,7 @@ use jointrig::campaign::sensor_check::polarity;
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
 use jointrig_hil_sim::rig::config::RigConfig;
-use jointrig_tests::campaign::attempt;
+use jointrig_tests::campaign::{attempt, one_second};
 use jointrig_tests::drawn_campaigns::count;
 use jointrig_tests::rigs::{Drawn, Elastic, contact_plan, drawn};
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ const CHANNELS: [&str; 9] = ["force", "vib_x", "vib_y", "vib_z", "ldv_a", "ldv_b
 /// A contact campaign with one hit in each cell; the verdict on each channel if `reversed` has the
 /// wrong sign.
 fn signs(config: &RigConfig, seed: u64, reversed: Option<&str>) -> BTreeMap<String, Option<bool>> {
-    let mut plan = contact_plan(config);
+    let mut plan = one_second(&contact_plan(config));
     for (old, new) in [
         // of the responses one on specimen A and those on B
         ("\"C1\", \"C2\", \"C3\", \"C4\", \"D1\", \"D2\", \"D3\"", "\"C1\""),
