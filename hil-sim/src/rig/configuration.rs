@@ -32,6 +32,9 @@ impl Configuration {
 
     /// Whether the paper's rig has `body` in this configuration.
     pub(super) fn has(self, body: BodyName) -> bool {
+        if body == BodyName::KnownMass {
+            return false;
+        }
         let of_b = matches!(body, BodyName::ArmB | BodyName::SpecimenB);
         match self {
             Self::A => !of_b,
@@ -71,13 +74,21 @@ pub enum BodyName {
     ArmB,
     /// Specimen B (substructure B); arm B itself when the clamp is rigid.
     SpecimenB,
+    /// The free body of known mass beside the rig.
+    KnownMass,
     /// A body of a rig that defines its own structure.
     Own(OwnName),
 }
 
-/// The bodies of the paper's rig.
-const PAPERS: [BodyName; 5] =
-    [BodyName::Mass, BodyName::ArmA, BodyName::SpecimenA, BodyName::ArmB, BodyName::SpecimenB];
+/// The bodies of the paper's rig, and the known mass beside it.
+const PAPERS: [BodyName; 6] = [
+    BodyName::Mass,
+    BodyName::ArmA,
+    BodyName::SpecimenA,
+    BodyName::ArmB,
+    BodyName::SpecimenB,
+    BodyName::KnownMass,
+];
 
 impl BodyName {
     /// The fixed end of a spring.
@@ -92,6 +103,7 @@ impl BodyName {
             Self::SpecimenA => "specimen_a",
             Self::ArmB => "arm_b",
             Self::SpecimenB => "specimen_b",
+            Self::KnownMass => "known_mass",
             Self::Own(name) => name.as_str(),
         }
     }

@@ -21,6 +21,7 @@
 //! record takes about as long as with rigid bodies; while the shaker drives, twice as long.
 
 use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
+use config::BodyName;
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
@@ -69,6 +70,7 @@ pub struct Rig {
     connected: Option<Connected>,
     flaws: Flaws,
     plants: [Plant; 3],
+    known_mass: Option<Plant>,
     stepping: Stepping,
     configuration: Configuration,
     impact: String,
@@ -117,6 +119,11 @@ impl Rig {
         let period_s = 1.0 / f64::from(config.scan_rate_hz);
         let plant = |configuration| Plant::new(config, configuration, stepping, period_s);
         let plants = [plant(Configuration::A)?, plant(Configuration::B)?, plant(Configuration::Ajb)?];
+        let known_mass = config
+            .known_mass
+            .as_ref()
+            .map(|mass| Plant::of_known_mass(mass, config, stepping, period_s))
+            .transpose()?;
         let ten = channels::channels(&config.sensors);
         let flaws = Flaws::new(seed, config, &ten);
         let sensors = Sensors::new(config, &ten, &flaws, None, stream(seed, &["at rest"]));
@@ -133,6 +140,7 @@ impl Rig {
             seed,
             period_s,
             plants,
+            known_mass,
             configuration,
             impact: impact.name.clone(),
             response: response.name.clone(),
@@ -210,8 +218,13 @@ impl Rig {
         let hit = self.config.impact(configuration, impact)?;
         let seen = self.config.response(configuration, response)?;
         let words = [configuration.as_str(), impact, response];
+        let on_known_mass = [hit.body, seen.body].contains(&BodyName::KnownMass);
+        if hit.body != seen.body && on_known_mass {
+            return Err(RigError::ApartFromKnownMass { impact: impact.into(), response: response.into() });
+        }
         let mark = self.config.spots.mark.as_ref();
-        let at_mark = configuration == Configuration::B && mark.is_some_and(|mark| mark.name == response);
+        let at_mark = configuration == Configuration::B
+            && (on_known_mass || mark.is_some_and(|mark| mark.name == response));
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen, at_mark);
         let speckle = seen.speckle;
         let drifted = (configuration == Configuration::Ajb && self.config.contact.drifts()).then(|| {
@@ -223,7 +236,8 @@ impl Rig {
             Some(config) => Some(Plant::new(config, configuration, self.stepping, self.period_s)?),
             None => None,
         };
-        let plant = fresh.as_ref().unwrap_or(&self.plants[configuration as usize]);
+        let own = self.known_mass.as_ref().filter(|_| on_known_mass);
+        let plant = fresh.as_ref().or(own).unwrap_or(&self.plants[configuration as usize]);
         let (stepper, slipping) = plant.aimed(config, &self.flaws, &aim, &self.channels)?;
         self.direct = plant.direct(config, &self.flaws, &aim);
         if let Some(fresh) = fresh {
@@ -428,27 +442,33 @@ impl Rig {
         self.last_hit.as_ref()
     }
 
+    /// What is stepped: the known mass if it is struck, else the staged configuration.
+    fn plant(&self) -> &Plant {
+        let known_mass = self.known_mass.as_ref().filter(|_| self.aim.impact.body == BodyName::KnownMass);
+        known_mass.unwrap_or(&self.plants[self.configuration as usize])
+    }
+
     /// Current mechanical energy of the structure (J).
     pub fn energy_j(&self) -> f64 {
-        let plant = &self.plants[self.configuration as usize];
+        let plant = self.plant();
         plant.energy_j(self.current(), &self.stepper, self.slipping.as_ref())
     }
 
     /// Current state of the joint; `None` outside the assembly.
     pub fn joint(&self) -> Option<JointState> {
-        let plant = &self.plants[self.configuration as usize];
+        let plant = self.plant();
         plant.joint_state(self.current(), &self.stepper, self.slipping.as_ref())
     }
 
     /// Current true displacement (m) and velocity (m/s) along a probe; `None` if its body is not
     /// present.
     pub fn motion(&self, probe: &Probe) -> Option<(f64, f64)> {
-        self.plants[self.configuration as usize].motion(&self.stepper, probe)
+        self.plant().motion(&self.stepper, probe)
     }
 
     /// Why the staged configuration is stepped by its matrix exponential, if it is.
     pub fn fallback(&self) -> Option<modal::ModalError> {
-        self.plants[self.configuration as usize].fallback()
+        self.plant().fallback()
     }
 }
 
@@ -472,6 +492,16 @@ pub enum RigError {
         reason: String,
         /// Line of the rig file, from 1, where the file sets it.
         line: Option<usize>,
+    },
+    /// Hammer and vibrometer are to be on the known mass and on another body.
+    #[error(
+        "impact {impact} and response {response} are not both on the known mass, which is connected to nothing: move both there, or neither"
+    )]
+    ApartFromKnownMass {
+        /// The impact.
+        impact: String,
+        /// The response.
+        response: String,
     },
     /// No such impact or response point in this configuration.
     #[error("no {kind} point {name:?} in configuration {configuration}; there are: {}", valid.join(", "))]

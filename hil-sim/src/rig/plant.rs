@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::channels::{CHANNELS, Channel, FIRST_SIGNAL};
-use super::config::{BodyName, ContactLaw, FixedQuantity, FixedSensor, RigConfig};
+use super::config::{BodyName, ContactLaw, FixedQuantity, FixedSensor, KnownMass, RigConfig};
 use super::modal::StateSpace;
 use super::modal::{ModalError, Mode, modes};
 use super::probe::{AXES, Probe};
@@ -50,7 +50,25 @@ impl Plant {
         stepping: Stepping,
         period_s: f64,
     ) -> Result<Self, RigError> {
-        let structure = Structure::new(config, configuration);
+        Self::of(Structure::new(config, configuration), config, stepping, period_s)
+    }
+
+    /// The same for the free body of known mass beside the rig.
+    pub(super) fn of_known_mass(
+        mass: &KnownMass,
+        config: &RigConfig,
+        stepping: Stepping,
+        period_s: f64,
+    ) -> Result<Self, RigError> {
+        Self::of(Structure::of_known_mass(mass), config, stepping, period_s)
+    }
+
+    fn of(
+        structure: Structure,
+        config: &RigConfig,
+        stepping: Stepping,
+        period_s: f64,
+    ) -> Result<Self, RigError> {
         let space = StateSpace::new(&structure)?;
         let exponential = |reason| Way::Exponential {
             a: Arc::new(space.a.clone()),

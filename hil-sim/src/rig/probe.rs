@@ -68,7 +68,11 @@ impl RigConfig {
     /// # Errors
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
-        let there = || self.response_points().filter(|point| self.has(configuration, point.body));
+        let of_mass = || self.known_mass_in(configuration).map(|mass| &mass.response);
+        let there = || {
+            let own = self.response_points().filter(|point| self.has(configuration, point.body));
+            own.chain(of_mass())
+        };
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "response",
             name: name.to_owned(),
@@ -82,7 +86,9 @@ impl RigConfig {
     /// # Errors
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
-        let there = || self.impacts.iter().filter(|point| self.has(configuration, point.body));
+        let of_mass = || self.known_mass_in(configuration).map(|mass| &mass.impact);
+        let there =
+            || self.impacts.iter().filter(|point| self.has(configuration, point.body)).chain(of_mass());
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "impact",
             name: name.to_owned(),

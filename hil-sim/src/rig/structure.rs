@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX};
 use num_complex::Complex;
 
 use super::beam::{Shapes, rigid_motion};
-use super::config::{Beam, BodyName, Bushing, Clamp, OwnStructure, RigConfig, RigidBody};
+use super::config::{Beam, BodyName, Bushing, Clamp, KnownMass, OwnStructure, RigConfig, RigidBody};
 use super::normalized;
 use super::{Configuration, Probe, Quantity, RigError};
 
@@ -46,6 +46,15 @@ impl Structure {
     /// Whether a body of it bends.
     pub fn bends(&self) -> bool {
         self.bodies.iter().any(|body| body.elastic.is_some())
+    }
+
+    /// The free body of known mass alone.
+    pub(super) fn of_known_mass(mass: &KnownMass) -> Self {
+        let body = Body::new(BodyName::KnownMass, mass.body.cg_m);
+        let mut structure = Self::empty(Configuration::B, vec![body], [false, false]);
+        structure.carry(BodyName::KnownMass, &body_mass(&mass.body));
+        structure.connect(None, Some(BodyName::KnownMass), &mass.foam);
+        structure
     }
 
     /// Checks that all bodies that should bend do.

@@ -12,6 +12,7 @@ mod flaws;
 mod frf;
 mod hammer;
 mod impact_record;
+mod known_mass;
 mod own_structure;
 mod records;
 mod reference;

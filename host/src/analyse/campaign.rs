@@ -10,7 +10,9 @@ use super::findings::{Findings, Settings};
 use super::from_frfs::{Fit, NoFit, Substructured, fits, recommended};
 use super::missing::{Missing, given_up};
 use super::modal::{FoundModes, MODES_HZ};
-use super::{cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode};
+use super::{
+    cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode, known_mass,
+};
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -34,6 +36,10 @@ pub fn analyse_measurements<M: Measurements>(
     let mut cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
     let mut missing = std::mem::take(&mut cells.missing);
     missing.extend(given_up(&names, measurements.given_up()));
+    let known_mass = known_mass::compared(measurements).unwrap_or_else(|why| {
+        missing.push(why);
+        None
+    });
     let data_quality = chosen::data_quality(geometry, &cells.averages);
 
     // the FRF matrix of each configuration
@@ -99,7 +105,7 @@ pub fn analyse_measurements<M: Measurements>(
     };
     let all_modes = || Structure::ALL.into_par_iter().zip(frfs).filter_map(modes_of).collect::<Vec<_>>();
     let ((fits, between_arms), (own, all_modes)) = rayon::join(between_the_arms_by_fit, || {
-        rayon::join(|| contact_answer::answer(measurements, &cells.averages), all_modes)
+        rayon::join(|| contact_answer::answer(measurements, &cells.averages, known_mass), all_modes)
     });
     let mut modes = Vec::new();
     for (configuration, found) in all_modes {

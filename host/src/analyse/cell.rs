@@ -97,6 +97,21 @@ pub struct SensorMass {
     pub mass_kg: f64,
 }
 
+/// The cell in which a free body of known mass is struck along the sliding direction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MassCell {
+    /// The cell.
+    pub name: CellName,
+    /// The body's mass, kg.
+    pub mass_kg: f64,
+    /// Relative standard deviation of the mass, and of hits beside its centre of gravity.
+    pub sigma: f64,
+    /// Index of the response's axis along the sliding direction.
+    pub axis: usize,
+    /// Whether the vibrometers of the spots are aimed at it too.
+    pub lasers: bool,
+}
+
 /// A level of the shaker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShakerLevel {
@@ -191,6 +206,12 @@ pub trait Measurements: Sync {
     /// Whether on B alone the vibrometers near the contact are aimed at this response point too.
     fn has_all_lasers(&self, _point: &str) -> bool {
         false
+    }
+
+    /// The cell in which a free body of known mass is struck, if the plan has one. It is not one of
+    /// [`Measurements::cells`].
+    fn known_mass(&self) -> Option<MassCell> {
+        None
     }
 
     /// The masses of the fixed sensors, as far as the plan states them.

@@ -3,7 +3,7 @@
 use super::averages::CellAverage;
 use super::cell::{CellName, Measurements};
 use crate::contact;
-use crate::contact::{Axes, BAND, ContactCell, ContactError, Input, Known, Stiffness, read};
+use crate::contact::{Axes, BAND, ContactCell, ContactError, Input, Known, KnownMass, Stiffness, read};
 use crate::spectra::CrossSpectra;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Geometry, Grouping};
@@ -29,20 +29,21 @@ pub fn reads(geometry: &Geometry, name: &CellName) -> bool {
         })
 }
 
-/// Identifies the contact from the averaged cells.
+/// Identifies the contact from the averaged cells and the hits on a known mass.
 ///
 /// # Errors
 /// Why there is no result, and how to obtain one.
 pub fn answer<M: Measurements>(
     measurements: &M,
     averages: &[CellAverage],
+    known_mass: Option<KnownMass>,
 ) -> Result<(Stiffness, Known), ContactError> {
     let cells = cells(measurements, averages, |average| average.damped.as_ref());
     if cells.is_empty() {
         let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
         return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
     }
-    read(&input(measurements, cells))
+    read(&Input { known_mass, ..input(measurements, cells) })
 }
 
 /// The cells that have these spectra.
@@ -79,7 +80,7 @@ pub fn cells<'a, M: Measurements>(
     averages.iter().filter_map(cell).collect()
 }
 
-/// Input of the contact identification.
+/// Input of the contact identification, without the known mass.
 pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>) -> Input<'a> {
     Input {
         cells,
@@ -88,6 +89,7 @@ pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>)
         specimens: measurements.specimens(),
         parallel_path: measurements.known_contact().parallel_path,
         priors: measurements.contact_priors(),
+        known_mass: None,
         band_hz: BAND,
     }
 }

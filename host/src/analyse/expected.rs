@@ -8,9 +8,9 @@
 use super::cell::CellName;
 use super::contact_answer::reads;
 use super::plan_geometry::geometry;
-use crate::campaign::plan::{Plan, structure};
+use crate::campaign::plan::{KNOWN_MASS_SIGMA, Plan, structure};
 use crate::contact::{
-    Axes, BAND, ContactCell, ContactError, ContactPriors, Input, SIGMA_PER_S, Stiffness, stiffness,
+    Axes, BAND, ContactCell, ContactError, ContactPriors, Input, KnownMass, SIGMA_PER_S, Stiffness, stiffness,
 };
 use crate::spectra::cross_spectra::OutputSums;
 use crate::spectra::{CrossSpectra, MotionQuantity};
@@ -57,6 +57,14 @@ pub fn expected(plan: &Plan) -> Option<Vec<Expected>> {
     CONTACTS_N_PER_M.into_iter().map(|k| one(plan, &geometry, k)).collect()
 }
 
+/// What the plan's known mass will show: nothing is off, and noise is far below the mass's own error.
+fn expected_on_mass(plan: &Plan) -> Option<KnownMass> {
+    let (own, cell) = (plan.known_mass.as_ref()?.get_ref(), plan.known_mass_cell()?);
+    let right = Some([1.0, 1e-3]);
+    let spots = if cell.lasers { [right; 2] } else { [None; 2] };
+    Some(KnownMass { sigma: own.sigma.unwrap_or(KNOWN_MASS_SIGMA), spots, point: right, axis: cell.axis })
+}
+
 /// A cell's spectra, with what identifies its hits.
 struct SimulatedCell {
     name: CellName,
@@ -94,6 +102,7 @@ fn one(plan: &Plan, geometry: &Geometry, contact_n_per_m: f64) -> Option<Expecte
         specimens: plan.known_specimens(),
         parallel_path: None,
         priors: plan.priors.as_ref().map_or_else(ContactPriors::default, |p| p.get_ref().known()),
+        known_mass: expected_on_mass(plan),
         band_hz: BAND,
     };
     for (cell, records) in cells.iter().zip(&sets) {

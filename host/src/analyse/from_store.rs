@@ -6,13 +6,14 @@ use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
 use super::cell::{
-    CellName, ContactDelays, Hit, KnownContact, Measurements, Progress, SensorMass, ShakerLevel, Wanted,
+    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, Progress, SensorMass, ShakerLevel,
+    Wanted,
 };
 use super::chosen::DataQuality;
 use super::findings::Findings;
 use super::modal::{FoundModes, NoModes};
 use super::plan_geometry::{geometry, places};
-use crate::campaign::plan::{Plan, ResponsePoint, structure};
+use crate::campaign::plan::{KNOWN_MASS_SIGMA, Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
@@ -446,7 +447,9 @@ impl Measurements for CampaignFile {
     }
 
     fn cells(&self) -> Vec<CellName> {
-        self.cells.iter().map(|c| c.name.clone()).collect()
+        let on_mass = self.known_mass().map(|cell| cell.name);
+        let names = self.cells.iter().map(|c| &c.name);
+        names.filter(|name| on_mass.as_ref() != Some(*name)).cloned().collect()
     }
 
     fn session_of(&self, record: i64) -> Option<i64> {
@@ -498,6 +501,17 @@ impl Measurements for CampaignFile {
 
     fn has_all_lasers(&self, point: &str) -> bool {
         self.plan.response(point).is_some_and(|point| point.lasers)
+    }
+
+    fn known_mass(&self) -> Option<MassCell> {
+        let (own, cell) = (self.plan.known_mass.as_ref()?.get_ref(), self.plan.known_mass_cell()?);
+        Some(MassCell {
+            name: CellName { configuration: Structure::B, impact: cell.impact, response: cell.response },
+            mass_kg: own.mass_kg,
+            sigma: own.sigma.unwrap_or(KNOWN_MASS_SIGMA),
+            axis: cell.axis,
+            lasers: cell.lasers,
+        })
     }
 
     fn sensor_masses(&self) -> Vec<SensorMass> {

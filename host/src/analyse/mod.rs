@@ -27,6 +27,7 @@ mod first_mode;
 mod from_frfs;
 mod from_store;
 mod impact_loops;
+mod known_mass;
 mod missing;
 mod modal;
 mod plan_geometry;

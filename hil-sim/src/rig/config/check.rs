@@ -3,8 +3,8 @@
 //! nothing) are checked. Each error names the field, and its line in the text.
 
 use super::{
-    Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, OwnBody, OwnStructure, RigConfig, RigidBody, Side,
-    Spring,
+    Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, KnownMass, OwnBody, OwnStructure, RigConfig,
+    RigidBody, Side, Spring,
 };
 use crate::rig::RigError;
 use crate::rig::channels::{CHANNELS, FORCE, channels};
@@ -51,6 +51,9 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
         bushing(&format!("leaf_springs[{index}]"), spring)?;
     }
     bushing("knife_edge", &config.knife_edge)?;
+    if let Some(mass) = &config.known_mass {
+        known_mass(mass)?;
+    }
     bushing("wire.bushing", &config.wire.bushing)?;
     bushing("push_rod_a.bushing", &config.push_rod_a.bushing)?;
     bushing("clamp.loaded", &config.clamp.loaded)?;
@@ -250,6 +253,26 @@ fn contact(config: &RigConfig) -> Result<(), RigError> {
 /// Checks a normal load (N).
 pub fn normal_load(normal_load_n: f64) -> Result<(), RigError> {
     not_negative("contact.normal_load_n", normal_load_n)
+}
+
+fn known_mass(mass: &KnownMass) -> Result<(), RigError> {
+    body("known_mass.body", &mass.body)?;
+    bushing("known_mass.foam", &mass.foam)?;
+    finite("known_mass.impact.position_m", &mass.impact.position_m)?;
+    finite("known_mass.response.position_m", &mass.response.position_m)?;
+    finite("known_mass.impact.direction", &mass.impact.direction)?;
+    if mass.impact.direction.iter().all(|d| *d == 0.0) {
+        return Err(bad(
+            "known_mass.impact.direction",
+            "must point somewhere: all three components are zero",
+        ));
+    }
+    for (field, body) in [("impact", mass.impact.body), ("response", mass.response.body)] {
+        if body != BodyName::KnownMass {
+            return Err(bad(&format!("known_mass.{field}.body"), "must be \"known_mass\""));
+        }
+    }
+    Ok(())
 }
 
 fn points(config: &RigConfig) -> Result<(), RigError> {

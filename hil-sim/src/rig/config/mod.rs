@@ -63,6 +63,10 @@ pub struct RigConfig {
     pub impacts: Vec<ImpactPoint>,
     /// Where the single-point vibrometers measure.
     pub spots: Spots,
+    /// A free body of known mass, on which hammer and vibrometers are compared; none if there is
+    /// no such body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known_mass: Option<KnownMass>,
     /// The shaker.
     pub shaker: Shaker,
     /// The automatic hammer.
@@ -116,6 +120,12 @@ impl RigConfig {
             Configuration::B => body.of == Side::B,
             Configuration::Ajb => true,
         })
+    }
+
+    /// The known mass, if hammer and vibrometer in `configuration` may be at it: it is used while
+    /// B is measured.
+    pub(super) fn known_mass_in(&self, configuration: Configuration) -> Option<&KnownMass> {
+        self.known_mass.as_ref().filter(|_| configuration == Configuration::B)
     }
 
     /// The bodies that the contact joins: A's, then B's.
@@ -338,6 +348,21 @@ pub struct Spot {
     pub body: BodyName,
     /// Position (m).
     pub position_m: [f64; 3],
+}
+
+/// A free body of known mass on a soft support, connected to nothing else. It may be struck while B
+/// is measured; the vibrometers of both spots are then aimed at its response point too.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownMass {
+    /// The body.
+    pub body: RigidBody,
+    /// Its support.
+    pub foam: Bushing,
+    /// Where the hammer hits it.
+    pub impact: ImpactPoint,
+    /// Where the vibrometers measure it.
+    pub response: ResponsePoint,
 }
 
 /// The two spots next to the contact.

@@ -234,7 +234,7 @@ impl Changes {
             let own = &quantities(fit, |_| true)[what];
             let (first, p) = (&fit.parameters.all()[own[0]], &fit.solution.p);
             let sigma = |i: usize| fit.solution.certainty.covariance[(i, i)].max(0.0).sqrt();
-            let off = |i: &usize| [p[*i] - fit.parameters.all()[*i].start, sigma(*i)];
+            let off = |i: &usize| [p[*i] - fit.parameters.all()[*i].expected(p), sigma(*i)];
             Contradiction { off: own.iter().map(off).collect(), ..Contradiction::new(what, first.cause) }
         };
         let kind = |(cause, scatter): (&Cause, &f64)| Contradiction {
@@ -272,7 +272,8 @@ fn quantities(fit: &Fit, chosen: impl Fn(&Parameter) -> bool) -> BTreeMap<String
 /// Deviations in stated standard deviations, and their covariance if the statements are true.
 fn deviations(fit: &Fit, own: &[usize]) -> (DVector<f64>, DMatrix<f64>) {
     let (all, answer) = (fit.parameters.all(), &fit.solution.certainty.answer);
-    let d = |n: usize, _| (fit.solution.p[own[n]] - all[own[n]].start) / all[own[n]].sigma;
+    let p = &fit.solution.p;
+    let d = |n: usize, _| (p[own[n]] - all[own[n]].expected(p)) / all[own[n]].sigma;
     let covariance = DMatrix::from_fn(own.len(), own.len(), |r, c| {
         let (i, j) = (own[r], own[c]);
         f64::from(u8::from(r == c)) - answer[(i, j)] / (all[i].sigma * all[j].sigma)

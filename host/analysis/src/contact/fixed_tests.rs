@@ -142,6 +142,7 @@ fn input<'a>(cells: &'a [Cell], keep: impl Fn(&Cell) -> bool) -> Input<'a> {
         specimens: [Some(Bulk::RIGID); 2],
         parallel_path: None,
         priors,
+        known_mass: None,
         band_hz: BAND,
     }
 }

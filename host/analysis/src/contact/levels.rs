@@ -18,9 +18,7 @@ use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
 use super::model::bulk_of_spot;
 use super::outcome::{FORCE_BALANCE, Interval, Variances, over_time, stiffness_of};
-use super::parameters::{
-    CENTRE, COMPLIANCE, Cause, DELAYS, FORM, GAINS, INERTIA_B, Parameters, SPOTS, TIP_B,
-};
+use super::parameters::{CENTRE, Cause, DELAYS, FORM, GAINS, HAMMER, INERTIA_B, Parameters, SPOTS, TIP_B};
 use super::{BAND, ContactError, Input, Known, START_M_PER_N, Stiffness};
 use crate::C;
 use crate::band::Band;
@@ -273,9 +271,11 @@ fn one(
     let of_mean =
         |part: fn(C) -> f64| scattered.iter().map(|k| part(k - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
     let relative = |variance: f64| variance.sqrt() / k.abs();
+    let of_fit_and_hammer = of_fit(&real);
+    let of_hammer = known.share(HAMMER, &real).min(of_fit_and_hammer);
     let shares = Shares {
-        fit: relative(of_fit(&real)),
-        hammer_gain: light.priors.hammer_gain,
+        fit: relative(of_fit_and_hammer - of_hammer),
+        hammer_gain: relative(of_hammer),
         turning: relative(0.5 * slope.norm_sqr() * turning),
         place: relative(slope.norm_sqr() * place),
         level: relative(of_mean(|c| c.re)),
@@ -287,10 +287,7 @@ fn one(
         return Err(LevelError::NotIdentified);
     }
     let c = stiffness.im / omega;
-    let of_c = of_fit(&imaginary)
-        + unknown / (omega * omega)
-        + of_mean(|c| c.im) / (omega * omega)
-        + (hammer_gain * c).powi(2);
+    let of_c = of_fit(&imaginary) + unknown / (omega * omega) + of_mean(|c| c.im) / (omega * omega);
     let half_c = NORMAL_95 * of_c.sqrt();
     let [t, a, b] = mean_of(&level.stretches);
     // d(1/k) = −dk/k²
@@ -339,7 +336,7 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Le
     });
     let turning = driven.known(&g);
     let mut by_parameter = DVector::<C>::zeros(p.len());
-    let own = (FORM..SPOTS + 4).chain([GAINS, GAINS + 1, DELAYS, DELAYS + 1]);
+    let own = (FORM..SPOTS + 4).chain([GAINS, GAINS + 1, DELAYS, DELAYS + 1, HAMMER]);
     for i in own {
         let step = STEP * known.certainty.covariance[(i, i)].max(0.0).sqrt();
         if step > 0.0 {
@@ -364,7 +361,8 @@ fn through(driven: &Driven<'_>, known: &Known, level: &SteadyLevel) -> Option<Le
 }
 
 /// Δx/F at the contact from a level's T, x_A and x_B, with the motions `u` per newton of T; `own_b`
-/// states whether specimen B has points of its own.
+/// states whether specimen B has points of its own. The form of the force and the bulk are per
+/// newton that the hammer shows.
 fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3], own_b: bool) -> C {
     let displacement =
         |channel: usize, seen: C| seen / ((1.0 + p[GAINS + channel]) * (-s * p[DELAYS + channel]).exp());
@@ -388,7 +386,7 @@ fn contact(p: &[f64], s: C, u: &[C; MOTIONS], [t, a, b]: [C; 3], own_b: bool) ->
                 + t * (p[INERTIA_B + 1] * (u[4] - u[1]) - p[INERTIA_B + 2] * (u[5] - u[2])));
     // z_arm of the form is without what F itself bends
     let force = force / (1.0 + form(2) * bulk_b);
-    (z_a - z_b + centre) / force - bulk_a + bulk_b - tip
+    ((z_a - z_b + centre) / force - bulk_a + bulk_b - tip) * (1.0 + p[HAMMER])
 }
 
 /// A level's compliance, its dependence on the parameters of the hits' fit, and its other
@@ -412,17 +410,10 @@ pub struct Reading {
 /// Difference between a level's compliance and that of the hits, in standard deviations of the
 /// difference.
 pub fn apart(known: &Known, reading: &Reading) -> f64 {
-    let difference = &reading.row - unit(known);
+    let (compliance, row) = known.of_contact();
     let own = reading.turning + reading.place + reading.level;
-    let variance = known.of_sum(&difference).values().sum::<f64>() + own;
-    (reading.compliance - known.p[COMPLIANCE]) / variance.sqrt()
-}
-
-/// The derivatives of the hits' own reading, which is the parameter itself.
-pub fn unit(known: &Known) -> DVector<f64> {
-    let mut unit = DVector::zeros(known.p.len());
-    unit[COMPLIANCE] = 1.0;
-    unit
+    let variance = known.of_sum(&(&reading.row - row)).values().sum::<f64>() + own;
+    (reading.compliance - compliance) / variance.sqrt()
 }
 
 /// k_T of hits and levels together.
@@ -452,10 +443,10 @@ pub fn joint(hits: &Stiffness, known: &Known, levels: &[&LevelStiffness]) -> Opt
         return None;
     }
     let readings: Vec<&Reading> = levels.iter().map(|level| &level.reading).collect();
-    let values: Vec<f64> =
-        std::iter::once(known.p[COMPLIANCE]).chain(readings.iter().map(|r| r.compliance)).collect();
+    let (compliance, row) = known.of_contact();
+    let values: Vec<f64> = std::iter::once(compliance).chain(readings.iter().map(|r| r.compliance)).collect();
     let rows: Vec<DVector<f64>> =
-        std::iter::once(unit(known)).chain(readings.iter().map(|r| r.row.clone())).collect();
+        std::iter::once(row).chain(readings.iter().map(|r| r.row.clone())).collect();
     let covariance = &known.certainty.covariance * known.misfit;
     let answered: Vec<DVector<f64>> = rows.iter().map(|row| &covariance * row).collect();
     let whole = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
@@ -476,7 +467,7 @@ pub fn joint(hits: &Stiffness, known: &Known, levels: &[&LevelStiffness]) -> Opt
     let scatter: f64 = counted.iter().map(|(reading, weight)| weight * weight * reading.level).sum();
     *variances.entry(Cause::Noise).or_default() += products(turning) + scatter;
     *variances.entry(Cause::Aim).or_default() += products(place);
-    let (k_t_n_per_m, budget) = stiffness_of(compliance, variances, known.hammer_gain).ok()?;
+    let (k_t_n_per_m, budget) = stiffness_of(compliance, variances).ok()?;
     let width = |k: &Interval| k.ci95[0].recip() - k.ci95[1].recip();
     let levels = weights[1..].iter().filter(|weight| **weight > 0.0).count();
     (levels > 0 && width(&k_t_n_per_m) < width(&hits.k_t_n_per_m)).then_some(Joint {

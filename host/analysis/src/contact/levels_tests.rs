@@ -169,6 +169,7 @@ fn input(cells: &[Cell], hammer_angle_rad: f64) -> Input<'_> {
         specimens: [Some(Bulk::RIGID); 2],
         parallel_path: None,
         priors,
+        known_mass: None,
         band_hz: BAND,
     }
 }

@@ -24,6 +24,7 @@
 //!
 //! - `block`: the measured signals of each cell, and the cells of an impact
 //! - `parameters`: the unknowns
+//! - `known_mass`: the gains of vibrometers and hammer relative to each other
 //! - `elastic`: how a specimen bends under the contact's force
 //! - `model`: the signals of a line as a linear map of the motion, and its elimination
 //! - `solver`: the most likely parameters and their uncertainty, with the residuals of a cell
@@ -42,6 +43,7 @@ mod driven;
 mod elastic;
 #[cfg(test)]
 mod fixed_tests;
+mod known_mass;
 mod levels;
 #[cfg(test)]
 mod levels_tests;
@@ -55,20 +57,21 @@ mod tests;
 pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
 pub use contradictions::Contradiction;
 pub use elastic::Bulk;
+pub use known_mass::{KnownMass, mass_ratio};
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
 };
 pub use outcome::{
     Diagnosis, Doubt, FORCE_BALANCE, Farthest, Interval, OfFrequency, SignalResidual, Stiffness,
 };
-pub use parameters::{Cause, ContactPriors};
+pub use parameters::{Cause, ContactPriors, HAMMER_GAIN, MASS_ERROR};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;
 use block::{Block, Group, POINT, blocks};
 use contradictions::Changes;
 use nalgebra::DVector;
-use outcome::{Variances, of_sum, trusted};
+use outcome::{Variances, of_contact, of_sum, trusted};
 use parameters::{ELASTIC, FORM, LATERAL, Parameters, TIP_B};
 use solver::Certainty;
 use solver::{Solution, Start};
@@ -101,6 +104,8 @@ pub struct Input<'a> {
     pub parallel_path: Option<f64>,
     /// Prior knowledge.
     pub priors: ContactPriors,
+    /// What hits on a free body of known mass show of the gains; `None` without such hits.
+    pub known_mass: Option<KnownMass>,
     /// The band of the lines used.
     pub band_hz: Band,
 }
@@ -199,13 +204,24 @@ pub struct Known {
     certainty: Certainty,
     /// Ratio of χ² to its expected value, at least 1.
     misfit: f64,
-    hammer_gain: f64,
 }
 
 impl Known {
+    /// The contact's compliance, m/N, and its derivatives by the parameters.
+    fn of_contact(&self) -> (f64, DVector<f64>) {
+        of_contact(&self.p)
+    }
+
     /// Variances of Σ row_i p_i by cause.
     fn of_sum(&self, row: &DVector<f64>) -> Variances {
         of_sum(row, &self.parameters, &self.certainty, self.misfit)
+    }
+
+    /// The share of the stated error of parameter `at` in the variance of Σ row_i p_i.
+    fn share(&self, at: usize, row: &DVector<f64>) -> f64 {
+        let sigma = self.parameters.all()[at].sigma;
+        let answer = (&self.certainty.answer * row)[at];
+        if sigma > 0.0 { (answer / sigma).powi(2) } else { 0.0 }
     }
 
     /// Variance of Σ row_i p_i, including misfit.
@@ -254,8 +270,7 @@ impl Fit {
         let found = outcome::of(input, &self, changes)?;
         let Fit { parameters, solution, .. } = self;
         let Solution { p, certainty, chi_square, .. } = solution;
-        let (misfit, hammer_gain) = (chi_square.max(1.0), input.priors.hammer_gain);
-        Ok((found, Known { p, parameters, certainty, misfit, hammer_gain }))
+        Ok((found, Known { p, parameters, certainty, misfit: chi_square.max(1.0) }))
     }
 }
 
@@ -278,6 +293,9 @@ impl Prepared {
         // without spots no signal depends on their positions
         let mut parameters =
             Parameters::new(&input.priors, START_M_PER_N, spots.unwrap_or_default(), input.elastic_priors());
+        if let Some(mass) = &input.known_mass {
+            parameters.compare_on(mass);
+        }
         let blocks = blocks(input, &mut parameters)?;
         if blocks.iter().filter(|block| block.along_z.is_some()).count() < 3 {
             return Err(ContactError::NoForce);

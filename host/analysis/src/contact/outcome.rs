@@ -11,7 +11,7 @@
 
 use super::block::Block;
 use super::contradictions::{self, Changes, Contradiction, Worst};
-use super::parameters::{COMPLIANCE, Cause, FORM, Parameters, RETARDATION};
+use super::parameters::{COMPLIANCE, Cause, FORM, HAMMER, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
 use super::{ContactError, Fit, Input};
 use crate::band::Band;
@@ -67,27 +67,21 @@ pub struct Stiffness {
 /// [`ContactError::NotIdentified`] if the compliance cannot be distinguished from zero.
 pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, ContactError> {
     let Fit { parameters, blocks, solution, .. } = fit;
-    let compliance = solution.p[COMPLIANCE];
     let covariance = &solution.certainty.covariance;
     let misfit = solution.chi_square.max(1.0);
-    let mut row = DVector::zeros(solution.p.len());
-    row[COMPLIANCE] = 1.0;
+    let (compliance, row) = of_contact(&solution.p);
     let variances = of_sum(&row, parameters, &solution.certainty, misfit);
-    let (mut k_t, mut budget) = stiffness_of(compliance, variances, input.priors.hammer_gain)?;
+    let (mut k_t, mut budget) = stiffness_of(compliance, variances)?;
     let k = k_t.mean;
     // c = β/c₀, which the hammer's gain scales as it scales k
     let beta = solution.p[RETARDATION];
-    let slopes = [-beta * k * k, k];
-    let at = [COMPLIANCE, RETARDATION];
-    let of_damping: f64 = (0..2)
-        .flat_map(|i| (0..2).map(move |j| (i, j)))
-        .map(|(i, j)| slopes[i] * slopes[j] * covariance[(at[i], at[j])])
-        .sum();
+    let mut slopes = &row * (-beta * k * k);
+    slopes[RETARDATION] = k;
+    let of_damping = (covariance * &slopes).dot(&slopes);
     let balance = force_balance(input, fit, misfit);
     let false_scale = balance.as_ref().map(|one| one.off[0][0].abs());
-    let hammer_gain = (false_scale.unwrap_or(0.0) / NORMAL_95).hypot(input.priors.hammer_gain);
-    let of_gain = (hammer_gain * beta * k).powi(2);
-    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_gain).sqrt();
+    let of_scale = (false_scale.unwrap_or(0.0) / NORMAL_95 * beta * k).powi(2);
+    let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_scale).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
 
     let diagnosis = diagnose(fit);
@@ -114,6 +108,15 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
     })
 }
 
+/// The contact's compliance, m/N, and its derivatives by the parameters: all signals are per newton
+/// that the hammer shows.
+pub fn of_contact(p: &[f64]) -> (f64, DVector<f64>) {
+    let mut row = DVector::zeros(p.len());
+    row[COMPLIANCE] = 1.0 + p[HAMMER];
+    row[HAMMER] = p[COMPLIANCE];
+    (p[COMPLIANCE] * (1.0 + p[HAMMER]), row)
+}
+
 /// Name of the contradiction between the hammer's force and the load cells'.
 pub const FORCE_BALANCE: &str = "the hammer's force cell";
 
@@ -133,9 +136,13 @@ fn force_balance(input: &Input<'_>, fit: &Fit, misfit: f64) -> Option<Contradict
     let mut row = DVector::zeros(fit.solution.p.len());
     row[FORM] = 1.0;
     row[FORM + 2] = load_cells.recip();
-    let beside = row.iter().zip(&fit.solution.p).map(|(row, p)| row * p).sum::<f64>() - 1.0;
+    // the force that the hammer shows, per newton of the load cells
+    let shown = row.dot(&DVector::from_column_slice(&fit.solution.p));
+    let hammer = 1.0 + fit.solution.p[HAMMER];
+    row[HAMMER] = -shown / hammer;
+    let beside = shown / hammer - 1.0;
     let fitted: f64 = of_sum(&row, &fit.parameters, &fit.solution.certainty, misfit).values().sum();
-    let sigma = fitted.sqrt().hypot(input.priors.gain).hypot(input.priors.hammer_gain);
+    let sigma = fitted.sqrt().hypot(input.priors.gain);
     let false_ = beside < -IMPOSSIBLE * sigma
         || input.parallel_path.is_some_and(|stated| beside > stated + MUCH_BESIDE.max(IMPOSSIBLE * sigma));
     let off = beside - input.parallel_path.unwrap_or(0.0);
@@ -185,9 +192,10 @@ fn of_frequency(blocks: &[Block], solution: &Solution, compliance: f64) -> Vec<O
     let mut lows: Vec<f64> = solution.bins.iter().map(|bin| bin.low_hz).collect();
     lows.sort_by(f64::total_cmp);
     lows.dedup();
+    let scale = 1.0 + solution.p[HAMMER];
     let at = |low: f64| {
         let part = part(blocks, solution, |_, at| at == low)?;
-        let (mean, half) = (compliance + part.deviation, NORMAL_95 * part.sigma);
+        let (mean, half) = (compliance + scale * part.deviation, NORMAL_95 * scale * part.sigma);
         let interval = Interval { mean: mean.recip(), ci95: [(mean + half).recip(), (mean - half).recip()] };
         let known = half < COMPLIANCE_HALF_WIDTH * mean;
         known.then_some(OfFrequency { frequency_hz: low + 0.5 * BIN_HZ, k_t_n_per_m: interval })
@@ -233,16 +241,13 @@ pub fn of_sum(row: &DVector<f64>, parameters: &Parameters, certainty: &Certainty
 }
 
 /// k_T of a compliance in m/N with these variances, and its relative standard deviation by cause.
-/// The hammer's gain, to which k_T is proportional, is added.
 ///
 /// # Errors
 /// [`ContactError::NotIdentified`] if the compliance cannot be distinguished from zero.
 pub fn stiffness_of(
     compliance: f64,
-    mut variances: Variances,
-    hammer_gain: f64,
+    variances: Variances,
 ) -> Result<(Interval, BTreeMap<Cause, f64>), ContactError> {
-    *variances.entry(Cause::Gains).or_default() += (hammer_gain * compliance).powi(2);
     let half = NORMAL_95 * variances.values().sum::<f64>().sqrt();
     if !(compliance > 0.0 && half < COMPLIANCE_HALF_WIDTH * compliance) {
         let stiffest = compliance + half;
@@ -457,7 +462,7 @@ fn diagnose(fit: &Fit) -> Diagnosis {
             own.stated && !matches!(own.cause, Cause::Noise | Cause::Aim) && own.sigma > 0.0
         });
     let farthest = stated
-        .map(|(own, p)| (own, own.deviations(*p)))
+        .map(|(own, value)| (own, own.deviations(*value, &solution.p)))
         .max_by(|(_, a), (_, b)| a.total_cmp(b))
         .map(|(own, deviations)| Farthest { what: own.name.clone(), deviations });
     let mut lows: Vec<f64> = solution.bins.iter().map(|bin| bin.low_hz).collect();

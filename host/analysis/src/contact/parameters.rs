@@ -3,6 +3,7 @@
 //! standard deviations.
 
 use super::elastic;
+use super::known_mass::{Compared, KnownMass};
 use crate::substructuring::averaged::Priors as Positions;
 use serde::Serialize;
 
@@ -46,8 +47,14 @@ const ELASTIC_NAMES: [&str; 2 * elastic::TERMS] = [
 pub const GAINS: usize = SPOTS + 4;
 /// Errors of delay of the same channels, s.
 pub const DELAYS: usize = GAINS + 5;
+/// Relative error of gain of the hammer's force cell. All signals are per newton that the hammer
+/// shows, so the fit's compliance is that of the contact times one minus this error.
+pub const HAMMER: usize = DELAYS + 5;
+/// Relative error of the known mass that was struck: of its weight, and of hits beside its centre
+/// of gravity.
+pub const KNOWN_MASS: usize = HAMMER + 1;
 /// Index of the first coordinate of the points.
-const POINTS: usize = DELAYS + 5;
+const POINTS: usize = KNOWN_MASS + 1;
 
 /// The sensors with a gain and a delay, in order.
 const SENSORS: [&str; 5] = [
@@ -57,6 +64,10 @@ const SENSORS: [&str; 5] = [
     "the 3-D vibrometer along y",
     "the 3-D vibrometer along z",
 ];
+/// Name of the hammer's gain, which hits on a known mass show relative to those of the vibrometers.
+pub const HAMMER_GAIN: &str = "the gain of the hammer's force cell";
+/// Name of the known mass's error.
+pub const MASS_ERROR: &str = "the known mass";
 /// Smallest prior standard deviation of the load cells' gain, relative. The load cells are springs,
 /// so that T is itself a form of z_B, θ_x and θ_y, and the coefficients of these can absorb most of
 /// an error of its gain and delay. Then only the priors determine gain and delay. This minimum
@@ -96,6 +107,9 @@ pub struct Parameter {
     /// Whether the prior is stated, so that a value far from it is a contradiction; otherwise it is
     /// a guess.
     pub stated: bool,
+    /// Whether the stated value is per newton of force, while the parameter is per newton that the
+    /// hammer shows.
+    pub per_newton: bool,
     /// For the z component of a hit: that of the nominal direction, and the standard deviation of
     /// the hammer's tilt, rad.
     pub tilted: Option<[f64; 2]>,
@@ -104,23 +118,31 @@ pub struct Parameter {
 impl Parameter {
     /// A parameter with a Gaussian prior.
     pub fn new(name: String, start: f64, sigma: f64, cause: Cause) -> Self {
-        Parameter { name, start, sigma, cause, stated: true, tilted: None }
+        Parameter { name, start, sigma, cause, stated: true, per_newton: false, tilted: None }
     }
 
-    /// Distance of `value` from its stated value, in standard deviations. For the hammer it is
-    /// computed from the tilt: the z component of a hit along z falls with the square of the tilt,
-    /// which has a long tail.
-    pub fn deviations(&self, value: f64) -> f64 {
+    /// The stated value with the hammer's gain of the parameters `p`.
+    pub fn expected(&self, p: &[f64]) -> f64 {
+        if self.per_newton { self.start * (1.0 + p[HAMMER]) } else { self.start }
+    }
+
+    /// Distance of `value`, one of the parameters `p`, from its stated value, in standard
+    /// deviations. For the hammer's tilt it is computed from the angle: the z component of a hit
+    /// along z falls with the square of the tilt, which has a long tail.
+    pub fn deviations(&self, value: f64, p: &[f64]) -> f64 {
         match self.tilted {
             Some([z, tilt_rad]) if value.abs() <= 1.0 => (value.acos() - z.acos()).abs() / tilt_rad,
-            _ => ((value - self.start) / self.sigma).abs(),
+            _ => ((value - self.expected(p)) / self.sigma).abs(),
         }
     }
 }
 
 /// All parameters, in order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Parameters(Vec<Parameter>);
+pub struct Parameters {
+    own: Vec<Parameter>,
+    compared: Vec<Compared>,
+}
 
 impl Parameters {
     /// The parameters that every fit has. `spots_m` are the positions of the spots relative to the
@@ -168,41 +190,58 @@ impl Parameters {
         {
             all.extend(SENSORS.map(|sensor| named(&format!("{what} of {sensor}"), 0.0, sigma, cause)));
         }
+        all.push(named(HAMMER_GAIN, 0.0, priors.hammer_gain, Cause::Gains));
+        all.push(named(MASS_ERROR, 0.0, 0.0, Cause::Gains));
         debug_assert_eq!(all.len(), POINTS);
-        Parameters(all)
+        Parameters { own: all, compared: Vec::new() }
+    }
+
+    /// Adds what the hits on a known mass show. The load cells' gain then counts per newton of force
+    /// instead of per newton that the hammer shows: a hammer that is off must not seem to be load
+    /// cells that are. Without a known mass it stays relative to the hammer, so that the load cells
+    /// alone never change the scale of k_T.
+    pub fn compare_on(&mut self, mass: &KnownMass) {
+        self.own[KNOWN_MASS].sigma = mass.sigma;
+        self.own[FORM].per_newton = true;
+        self.compared = mass.compared();
+    }
+
+    /// The sensors that are compared with the hammer on a known mass.
+    pub fn compared(&self) -> &[Compared] {
+        &self.compared
     }
 
     /// Appends parameters; returns the index of the first.
     pub fn add(&mut self, own: impl IntoIterator<Item = Parameter>) -> usize {
-        let at = self.0.len();
-        self.0.extend(own);
+        let at = self.own.len();
+        self.own.extend(own);
         at
     }
 
     /// Makes a parameter exactly known.
     pub fn hold(&mut self, at: usize, value: f64) {
-        self.0[at].start = value;
-        self.0[at].sigma = 0.0;
+        self.own[at].start = value;
+        self.own[at].sigma = 0.0;
     }
 
     /// Sets the prior standard deviation of a parameter.
     pub fn narrow(&mut self, at: usize, sigma: f64) {
-        self.0[at].sigma = sigma;
+        self.own[at].sigma = sigma;
     }
 
     /// The parameters.
     pub fn all(&self) -> &[Parameter] {
-        &self.0
+        &self.own
     }
 
     /// The parameters, to change their priors.
     pub fn all_mut(&mut self) -> &mut [Parameter] {
-        &mut self.0
+        &mut self.own
     }
 
     /// Their prior means.
     pub fn start(&self) -> Vec<f64> {
-        self.0.iter().map(|p| p.start).collect()
+        self.own.iter().map(|p| p.start).collect()
     }
 }
 
@@ -219,6 +258,7 @@ pub fn along_z(impact: &str, direction: [f64; 3], tilt_rad: f64) -> Parameter {
         sigma: (tilt_rad * across).hypot(second),
         cause: Cause::HammerTilt,
         stated: true,
+        per_newton: false,
         tilted: Some([z, tilt_rad]),
     }
 }

@@ -10,7 +10,7 @@
 use super::ContactError;
 use super::block::Block;
 use super::model::{Normal, Residual};
-use super::parameters::{COMPLIANCE, Parameters};
+use super::parameters::{COMPLIANCE, HAMMER, Parameters};
 use crate::errors_in_variables::NoiseInflation;
 use crate::frf::noise::shared_by_lines;
 use crate::parallel::prelude::*;
@@ -270,7 +270,9 @@ impl Posterior<'_> {
     fn prior(&self, p: &[f64]) -> f64 {
         let own = self.parameters.all().iter().zip(p);
         let own = own.filter(|(own, _)| own.sigma.is_finite() && own.sigma > 0.0);
-        own.map(|(own, p)| 0.5 * ((p - own.start) / own.sigma).powi(2)).sum()
+        let stated: f64 = own.map(|(own, value)| 0.5 * ((value - own.expected(p)) / own.sigma).powi(2)).sum();
+        let compared = self.parameters.compared().iter();
+        stated + compared.map(|own| 0.5 * own.deviation(p).0.powi(2)).sum::<f64>()
     }
 
     /// Half the posterior's curvature, and its gradient. |r|² is minus the log-likelihood of
@@ -285,7 +287,23 @@ impl Posterior<'_> {
             // an exactly known parameter must not move
             let precision = 0.5 / (own.sigma * own.sigma).max(f64::MIN_POSITIVE.sqrt());
             information[(i, i)] += precision;
-            gradient[i] += precision * (p - own.start);
+            let deviation = p - own.expected(&at.p);
+            gradient[i] += precision * deviation;
+            if own.per_newton {
+                gradient[HAMMER] -= precision * own.start * deviation;
+                information[(HAMMER, HAMMER)] += precision * own.start * own.start;
+                information[(i, HAMMER)] -= precision * own.start;
+                information[(HAMMER, i)] -= precision * own.start;
+            }
+        }
+        for own in self.parameters.compared() {
+            let (deviation, by) = own.deviation(&at.p);
+            for (i, one) in by {
+                gradient[i] += 0.5 * one * deviation;
+                for (j, other) in by {
+                    information[(i, j)] += 0.5 * one * other;
+                }
+            }
         }
         (information, gradient)
     }

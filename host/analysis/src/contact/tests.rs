@@ -54,6 +54,8 @@ struct World {
     gains: [f64; 2],
     /// Whether both are aimed near the third point of arm B while B alone is measured.
     together: bool,
+    /// Relative error of the hammer's gain.
+    hammer: f64,
     /// Seed of the noise.
     seed: u64,
 }
@@ -172,7 +174,8 @@ fn measured(world: World) -> Vec<Cell> {
                         v(of_spots[0]) * (1.0 + world.gains[0]),
                         v(of_spots[1]) * (1.0 + world.gains[1]),
                         t,
-                    ];
+                    ]
+                    .map(|per_newton| per_newton / (1.0 + world.hammer));
                     s_ff.push(2.0);
                     for (n, (x, sums)) in exact.iter().zip(&mut outputs).enumerate() {
                         let sigma = if n == 5 { 1e-3 } else { world.noise_m_per_s };
@@ -248,6 +251,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
         specimens: [Some(Bulk::RIGID); 2],
         parallel_path: None,
         priors,
+        known_mass: None,
         band_hz: BAND,
     }
 }
@@ -262,6 +266,7 @@ const QUIET: World = World {
     tip: [0.0; 2],
     gains: [0.0; 2],
     together: false,
+    hammer: 0.0,
 };
 
 #[test]
@@ -293,6 +298,38 @@ fn lasers_together_on_arm_b_compare_their_gains() {
     let taken_for_spots = stiffness(&input).expect("all is there");
     assert!(taken_for_spots.diagnosis.calibration.chi_square > 100.0, "{taken_for_spots:?}");
     assert_eq!(taken_for_spots.doubts, [Doubt::Force]);
+}
+
+#[test]
+fn a_known_mass_shows_a_hammer_that_is_off() {
+    let cells = measured(World { noise_m_per_s: 1e-7, hammer: 0.05, ..QUIET });
+    let mut of_hammer = input(&cells);
+    (of_hammer.priors.gain, of_hammer.priors.hammer_gain) = (5e-3, 5e-3);
+    // every motion per newton of a hammer that shows 5 % too much force is 5 % too small
+    let without = stiffness(&of_hammer).expect("all is there").k_t_n_per_m;
+    assert!(without.ci95[0] > K, "{without:?}");
+    let shows = |ratio: f64| {
+        let ratio = Some([ratio, 5e-4]);
+        Some(KnownMass { sigma: 2e-3, spots: [ratio; 2], point: ratio, axis: 2 })
+    };
+    of_hammer.known_mass = shows(1.0 / 1.05);
+    let found = stiffness(&of_hammer).expect("all is there");
+    let [low, high] = found.k_t_n_per_m.ci95;
+    assert!(low < K && K < high && (high - low) < 0.03 * K, "{found:?}");
+    assert_eq!(found.contradictions.len(), 1, "{found:?}");
+    assert_eq!(found.contradictions[0].what, HAMMER_GAIN);
+    let [off, sigma] = found.contradictions[0].off[0];
+    assert!((off - 0.05).abs() < 3.0 * sigma && sigma < 6e-3, "{off} {sigma}");
+    // what is right is confirmed, and the interval is narrower than without the mass
+    let cells = measured(World { noise_m_per_s: 1e-7, ..QUIET });
+    let mut right = input(&cells);
+    right.priors = of_hammer.priors;
+    let without = stiffness(&right).expect("all is there").k_t_n_per_m;
+    right.known_mass = shows(1.0);
+    let confirmed = stiffness(&right).expect("all is there");
+    assert!(confirmed.contradictions.is_empty(), "{confirmed:?}");
+    let width = |of: Interval| of.ci95[1] - of.ci95[0];
+    assert!(width(confirmed.k_t_n_per_m) < width(without), "{confirmed:?}");
 }
 
 #[test]

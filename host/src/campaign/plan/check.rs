@@ -2,8 +2,8 @@
 //! grammar, and which results its measurements can yield, with what is missing for each.
 
 use super::faults::Faults;
-use super::sensor::{ResponsePoint, check_sensors};
-use super::{ConfigurationPlan, Plan, configuration_name, configuration_named, turned};
+use super::sensor::{ResponsePoint, WORST_GAIN, check_sensors};
+use super::{ConfigurationPlan, ON_KNOWN_MASS, Plan, configuration_name, configuration_named, turned};
 use crate::contact::determines_motion;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use jointrig_protocol::request::Configuration;
@@ -84,6 +84,7 @@ impl Plan {
         check_sensors(&self.channel, faults);
         self.check_geometry(faults);
         self.check_configurations(faults);
+        self.check_known_mass(faults);
     }
 
     fn check_limits(&self, faults: &mut Faults) {
@@ -216,9 +217,9 @@ impl Plan {
                 format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes"),
             );
             faults.unless(
-                (1..=6).contains(&grouping),
+                (1..=ON_KNOWN_MASS).contains(&grouping),
                 at,
-                format!("geometry: grouping of `{name}` must be 1 to 6"),
+                format!("geometry: grouping of `{name}` must be 1 to {ON_KNOWN_MASS}"),
             );
             let (seen, kind) =
                 if is_response { (&mut sensors, "response") } else { (&mut hammers, "impact") };
@@ -248,11 +249,11 @@ impl Plan {
         for point in self.geometry.response.iter().filter(|point| point.get_ref().lasers) {
             let (at, own) = (point.span().start, point.get_ref());
             faults.unless(
-                own.grouping == 2 && own.channels.is_none(),
+                [2, ON_KNOWN_MASS].contains(&own.grouping) && own.channels.is_none(),
                 at,
                 format!(
-                    "geometry: lasers of `{}`: LDV_A and LDV_B are compared with the 3-D vibrometer on arm B, \
-                     at a point of grouping 2 without channels of its own",
+                    "geometry: lasers of `{}`: LDV_A and LDV_B are compared with the 3-D vibrometer on arm B or on the \
+                     known mass, at a point of grouping 2 or {ON_KNOWN_MASS} without channels of its own",
                     own.name
                 ),
             );
@@ -290,6 +291,68 @@ impl Plan {
                     format!("geometry: channels of `{name}`: `{channel}` is listed twice; a channel belongs to one point only"),
                 );
             }
+        }
+    }
+
+    /// Checks that the points of the known mass are stated together with it, and that hammer and
+    /// vibrometer go to it together, while B is measured.
+    fn check_known_mass(&self, faults: &mut Faults) {
+        if let Some(own) = &self.known_mass {
+            let (at, own) = (own.span().start, own.get_ref());
+            let plausible = own.mass_kg.is_finite() && own.mass_kg > 0.0 && own.mass_kg < HEAVIEST_KG;
+            faults.unless(
+                plausible,
+                at,
+                format!("known_mass.mass_kg must be over 0 and below {HEAVIEST_KG} kg"),
+            );
+            faults.unless(
+                own.sigma.is_none_or(|sigma| (0.0..WORST_GAIN).contains(&sigma)),
+                at,
+                format!("known_mass.sigma must be a relative standard deviation from 0 to {WORST_GAIN}"),
+            );
+            faults.unless(
+                self.known_mass_cell().is_some(),
+                at,
+                format!(
+                    "known_mass needs a block of configuration B with one impact and one response of grouping {ON_KNOWN_MASS}"
+                ),
+            );
+        }
+        for point in &self.geometry.impact {
+            let (at, own) = (point.span().start, point.get_ref());
+            let along = turned(&self.to_interface(), own.direction)[2].abs();
+            faults.unless(
+                own.grouping != ON_KNOWN_MASS || along > SAME_DIRECTION,
+                at,
+                format!(
+                    "geometry: direction of `{}` must be the sliding direction: it hits the known mass",
+                    own.name
+                ),
+            );
+        }
+        for block in &self.configuration {
+            let (at, name) = (block.name.span().start, block.name.get_ref());
+            let hit = block.impacts.iter().map(|own| self.impact_is(own.get_ref(), &[ON_KNOWN_MASS]));
+            let seen = block.responses.iter().map(|own| self.response_is(own.get_ref(), &[ON_KNOWN_MASS]));
+            let on_mass: Vec<bool> = hit.chain(seen).collect();
+            if !on_mass.contains(&true) {
+                continue;
+            }
+            faults.unless(
+                !on_mass.contains(&false),
+                at,
+                format!(
+                    "configuration `{name}`: points of grouping {ON_KNOWN_MASS} are on the known mass, which is connected to nothing: \
+                     give it a block of its own"
+                ),
+            );
+            faults.unless(
+                self.configuration(name) == Some(Configuration::B) && self.known_mass.is_some(),
+                at,
+                format!(
+                    "configuration `{name}`: points of grouping {ON_KNOWN_MASS} need [known_mass], and are measured in B"
+                ),
+            );
         }
     }
 
@@ -350,9 +413,27 @@ fn check_names(names: &[Spanned<String>], known: &HashSet<&str>, field: &str, fa
     }
 }
 
+/// The cell on the known mass.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KnownMassCell {
+    /// Name of the impact.
+    pub impact: String,
+    /// Name of the response point.
+    pub response: String,
+    /// Index of its axis along the sliding direction.
+    pub axis: usize,
+    /// Whether the vibrometers of the spots are aimed at it too.
+    pub lasers: bool,
+}
+
 /// Response points needed to determine a rigid body's motion, and impacts needed to determine its
 /// response.
 const BODY: usize = 3;
+/// Largest plausible known mass, kg: catches grams.
+const HEAVIEST_KG: f64 = 200.0;
+/// Least cosine between the hit on the known mass, or the vibrometer's axis, and the sliding
+/// direction.
+const SAME_DIRECTION: f64 = 0.99;
 /// An impact counts as along z if the z component of its unit direction exceeds this.
 const ALONG_Z: f64 = 0.9;
 
@@ -387,6 +468,26 @@ impl Plan {
             }
         }
         needs
+    }
+
+    /// The cell on the known mass; `None` unless the plan has exactly one, with a response that the
+    /// 3-D vibrometer visits and of which an axis is the sliding direction.
+    pub fn known_mass_cell(&self) -> Option<KnownMassCell> {
+        let cells = self.cells();
+        let mut on_mass = cells.iter().filter(|cell| {
+            self.impact_is(&cell.impact, &[ON_KNOWN_MASS])
+                && self.response_is(&cell.response, &[ON_KNOWN_MASS])
+        });
+        let cell = on_mass.next().filter(|_| on_mass.next().is_none())?;
+        let point = self.response(&cell.response).filter(|point| point.channels.is_none())?;
+        let rows = self.to_interface();
+        let along = |(_, axis): &(String, [f64; 3])| turned(&rows, *axis)[2].abs() > SAME_DIRECTION;
+        Some(KnownMassCell {
+            impact: cell.impact.clone(),
+            response: cell.response.clone(),
+            axis: point.axes().iter().position(along)?,
+            lasers: point.lasers,
+        })
     }
 
     /// What is missing for the stiffness between the arms; empty if nothing is.

@@ -15,6 +15,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use toml::Spanned;
 
+pub use check::KnownMassCell;
 pub use sensor::{CalibrationFile, GeometryPlan, ImpactPoint, ResponsePoint, SensorPlan, SensorPoint};
 pub use structure::{StructurePlan, turned};
 
@@ -28,7 +29,7 @@ mod structure;
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
 /// All cells of the paper's campaign and those on the specimen, three good hits in each.
 pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
-/// The minimum for the contact's own stiffness: 67 cells of three hits.
+/// The minimum for the contact's own stiffness: 68 cells of three hits.
 pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
 /// The paper's campaign and the cells on the specimen: yields both stiffnesses.
 pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
@@ -105,6 +106,8 @@ pub struct Plan {
     pub contact: Option<Spanned<ContactPlan>>,
     /// The specimens' bulk; what is absent follows from their points, or widens the interval.
     pub specimens: Option<Spanned<SpecimensPlan>>,
+    /// The free body of known mass on which hammer and vibrometers are compared; none if absent.
+    pub known_mass: Option<Spanned<KnownMassPlan>>,
     /// The laboratory's measurement errors; if absent, the usual values for careful manual work.
     pub priors: Option<Spanned<PriorsPlan>>,
     /// The sensors on the device's channels; channels that are not listed are taken as the device
@@ -440,6 +443,25 @@ impl Plan {
         );
     }
 }
+
+/// A free body of known mass, struck along the sliding direction while B alone is measured: the
+/// points of grouping 7 are on it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownMassPlan {
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Relative standard deviation of the comparison from the mass, and from hits and vibrometers
+    /// beside its centre of gravity; [`KNOWN_MASS_SIGMA`] if absent.
+    pub sigma: Option<f64>,
+}
+
+/// Relative standard deviation of a comparison on a known mass: a cube of 3 kg that is struck and
+/// seen within 1 mm of its middle.
+pub const KNOWN_MASS_SIGMA: f64 = 0.002;
+
+/// Grouping of the points on the known mass: they are part of no structure.
+pub const ON_KNOWN_MASS: u8 = 7;
 
 /// Standard deviations; values that are absent default to those of careful manual work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]

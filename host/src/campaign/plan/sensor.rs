@@ -191,7 +191,7 @@ const WORST_PLACING_M: f64 = 0.05;
 /// Largest plausible tilt of the hammer, rad: catches degrees.
 const WORST_TILT_RAD: f64 = 0.5;
 /// Largest plausible relative gain error.
-const WORST_GAIN: f64 = 0.5;
+pub(super) const WORST_GAIN: f64 = 0.5;
 /// Largest plausible delay error, s: catches µs and ms.
 const WORST_SKEW_S: f64 = 0.01;
 /// Largest plausible mass of a sensor, g.
@@ -382,7 +382,7 @@ pub struct ResponsePoint {
     /// Its name.
     pub name: String,
     /// 1 interface of A, 2 interface of B, 3 internal of A, 4 internal of B, 5 on specimen A, 6 on
-    /// specimen B.
+    /// specimen B, 7 on the known mass.
     pub grouping: u8,
     /// Its position, m.
     pub position_m: [f64; 3],

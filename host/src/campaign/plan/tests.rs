@@ -41,13 +41,13 @@ fn hammer_and_laser_move_as_little_as_they_can() {
 }
 
 #[test]
-fn the_contacts_plan_has_67_cells_and_no_a() {
+fn the_contacts_plan_has_68_cells_and_no_a() {
     let plan = Plan::parse(CONTACT, "contact.toml").expect("a good plan");
     let cells = plan.cells();
     let of = |wanted| cells.iter().filter(|cell| cell.configuration == wanted).count();
-    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 27, 40));
+    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 28, 40));
     assert_eq!((plan.hits.get_ref().wanted, plan.hits.get_ref().minimum), (3, 2));
-    assert_eq!(plan.configuration.len(), 2);
+    assert_eq!(plan.configuration.len(), 3);
 }
 
 #[test]
@@ -138,6 +138,30 @@ fn lasers_are_compared_on_arm_b_and_only_there() {
         .expect_err("on a specimen")
         .to_string();
     assert!(said.contains("compared with the 3-D vibrometer on arm B"), "{said}");
+}
+
+#[test]
+fn a_known_mass_has_a_cell_of_its_own_in_b() {
+    let plan = Plan::parse(CONTACT, "contact.toml").expect("a good plan");
+    let cell = plan.known_mass_cell().expect("a known mass");
+    assert_eq!((&*cell.impact, &*cell.response, cell.axis, cell.lasers), ("MASS", "MASS", 2, true));
+    let block = "name = \"B\"\nimpacts = [\"MASS\"]\nresponses = [\"MASS\"]";
+    for (from, to, said) in [
+        ("mass_kg = 3.0", "mass_kg = 3000.0", "mass_kg must be over 0"),
+        ("sigma = 0.002", "sigma = 2.0", "relative standard deviation"),
+        ("[known_mass]\nmass_kg = 3.0\nsigma = 0.002", "", "need [known_mass]"),
+        (block, "name = \"B\"\nimpacts = [\"MASS\"]\nresponses = [\"B1\"]", "a block of its own"),
+        (block, "name = \"AJB\"\nimpacts = [\"MASS\"]\nresponses = [\"MASS\"]", "are measured in B"),
+        (
+            "0.0363], direction = [0, 0, -1]",
+            "0.0363], direction = [0, -1, 0]",
+            "must be the sliding direction",
+        ),
+    ] {
+        assert!(CONTACT.contains(from), "{from}");
+        let wrong = Plan::parse(&CONTACT.replacen(from, to, 1), "my.toml").expect_err(from).to_string();
+        assert!(wrong.contains(said), "{from}: {wrong}");
+    }
 }
 
 #[test]

@@ -4,7 +4,9 @@ use super::number::{AnswerLine, BETWEEN, CLAMP, CONTACT};
 use super::number::{micro, short};
 #[cfg(feature = "sim")]
 use crate::analyse::expected::Expected;
-use crate::contact::{Cause, Contradiction, Diagnosis, Doubt, FORCE_BALANCE, Interval, Stiffness};
+use crate::contact::{
+    Cause, Contradiction, Diagnosis, Doubt, FORCE_BALANCE, HAMMER_GAIN, Interval, MASS_ERROR, Stiffness,
+};
 use crate::results::{Answer, Results};
 use crate::substructuring::between_arms::Basis as Estimate;
 use std::collections::BTreeMap;
@@ -129,6 +131,13 @@ fn of_contradiction(one: &Contradiction) -> String {
              looks the same: remove it."
         ),
         Cause::Gains if one.what == FORCE_BALANCE => force_balance(one.off[0][0], &off),
+        Cause::Gains if one.what == HAMMER_GAIN => format!(
+            "On the known mass {} seems off by {off}, or all vibrometers together: calibrate them again. k_T allows for it.",
+            one.what
+        ),
+        Cause::Gains if one.what == MASS_ERROR => {
+            format!("{name} seems off by {off}: weigh it again, and strike it in the middle.")
+        }
         Cause::Gains => format!("{name} seems off by {off}: calibrate it again."),
         Cause::Drift => format!(
             "The contact changed between the first and the last hits on A: T over the displacement between the spots changed by {off}. Look for wear, for a \
