@@ -29,6 +29,7 @@ mod from_store;
 mod impact_loops;
 mod missing;
 mod modal;
+pub mod next_cell;
 mod plan_geometry;
 mod question;
 #[cfg(test)]
