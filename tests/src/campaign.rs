@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use jointrig::campaign::plan::CONTACT;
 use jointrig::campaign::run::error::RunError;
+use jointrig::campaign::run::further::Further;
 use jointrig::campaign::run::runner::{self, Options, Summary};
 use jointrig::campaign::run::stage::Stage;
 use jointrig::campaign::store::Store;
@@ -146,6 +147,23 @@ pub fn attempt(file: &Path, plan: &str, transport: Box<dyn Transport>) -> Result
     } else {
         Store::create(file, plan, "test plan").unwrap()
     };
+    measure(store, transport, None)
+}
+
+/// Continues a campaign with the cells that are chosen after those of the plan.
+pub fn run_further(
+    file: &Path,
+    transport: Box<dyn Transport>,
+    further: Further,
+) -> Result<Summary, RunError> {
+    measure(Store::open(file).unwrap(), transport, Some(further))
+}
+
+fn measure(
+    store: Store,
+    transport: Box<dyn Transport>,
+    further: Option<Further>,
+) -> Result<Summary, RunError> {
     let mut session = Session::open(transport, "test").unwrap();
     let options = Options {
         stage: Stage::Auto,
@@ -154,6 +172,7 @@ pub fn attempt(file: &Path, plan: &str, transport: Box<dyn Transport>) -> Result
         watch: Watchers::default(),
         edits: None,
         answers: None,
+        further,
         stop: Arc::new(AtomicBool::new(false)),
     };
     runner::run(store, &mut session, &mut ByRecord, &options)

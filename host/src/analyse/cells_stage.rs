@@ -63,7 +63,8 @@ pub fn read_all<M: Measurements>(
     all
 }
 
-fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> Cells {
+/// Reads and averages one cell; see [`read_all`].
+pub fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool) -> Cells {
     let mut found = Cells::default();
     let records = |told: String| Missing::Records { cell: name.clone(), told };
     let geometry = measurements.geometry();

@@ -43,7 +43,7 @@ pub fn answer<M: Measurements>(
         let hit = averages.iter().any(|a| a.name.configuration == Structure::Ajb && a.contact.is_some());
         return Err(if hit { ContactError::NoRotation } else { ContactError::NoCells });
     }
-    read(&Input { known_mass, ..input(measurements, cells) })
+    read(&input(measurements, cells, known_mass))
 }
 
 /// The cells that have these spectra.
@@ -80,8 +80,12 @@ pub fn cells<'a, M: Measurements>(
     averages.iter().filter_map(cell).collect()
 }
 
-/// Input of the contact identification, without the known mass.
-pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>) -> Input<'a> {
+/// Input of the contact identification.
+pub fn input<'a, M: Measurements>(
+    measurements: &M,
+    cells: Vec<ContactCell<'a>>,
+    known_mass: Option<KnownMass>,
+) -> Input<'a> {
     Input {
         cells,
         contact_m: measurements.geometry().virtual_point_b_m,
@@ -89,7 +93,7 @@ pub fn input<'a, M: Measurements>(measurements: &M, cells: Vec<ContactCell<'a>>)
         specimens: measurements.specimens(),
         parallel_path: measurements.known_contact().parallel_path,
         priors: measurements.contact_priors(),
-        known_mass: None,
+        known_mass,
         band_hz: BAND,
     }
 }

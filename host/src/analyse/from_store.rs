@@ -312,6 +312,18 @@ impl CampaignFile {
         struck.filter_map(|id| self.records.get(&id)).flatten()
     }
 
+    /// The kept records that are used for a cell.
+    pub(super) fn kept_records(&self, name: &CellName) -> Vec<i64> {
+        let Some(cell) = self.cells.iter().find(|cell| cell.name == *name) else { return Vec::new() };
+        self.records_for(cell).flatten().filter(|record| record.kept()).map(|record| record.id).collect()
+    }
+
+    /// The cell of the last record, where hammer and vibrometer are; `None` without records.
+    pub(super) fn last_struck(&self) -> Option<CellName> {
+        let last = self.records.values().flatten().flatten().max_by_key(|record| record.id)?;
+        self.cells.iter().find(|cell| cell.id == last.cell).map(|cell| cell.name.clone())
+    }
+
     /// Runs `work` with a connection that no other thread uses.
     fn with_reader<T>(
         &self,

@@ -30,6 +30,7 @@ mod impact_loops;
 mod known_mass;
 mod missing;
 mod modal;
+pub mod next_cell;
 mod plan_geometry;
 mod question;
 #[cfg(test)]

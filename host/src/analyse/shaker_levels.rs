@@ -242,7 +242,8 @@ pub fn k_t_of_levels<M: Measurements>(
         return all(NoLevelStiffness::Doubted);
     }
     let light = cells(measurements, averages, |average| average.light.as_ref());
-    let light = input(measurements, light);
+    // the gains are those of the fit of the hits
+    let light = input(measurements, light, None);
     if light.spots_m.is_none() {
         return all(NoLevelStiffness::NoContact);
     }

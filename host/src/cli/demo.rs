@@ -58,7 +58,7 @@ impl Demo {
         let again = self.again();
         let address = Address::Sim { rig: self.rig.clone() };
         let device = run::Device { address: &address, seed: self.seed, log_tables: None };
-        let who = run::Who { stage: Stage::Device, yes: true, new_structure: false, stop };
+        let who = run::Who { stage: Stage::Device, yes: true, new_structure: false, further: None, stop };
         let summary = run::measure(store, device, who, &mut onlooker, Some(&again), &mut ByRecord)?;
         if summary.interrupted {
             let (file, folder) = (quoted(&file), quoted(folder));

@@ -211,7 +211,13 @@ impl SelfTest {
         let store = Store::create(file, text, name)?;
         let address = Address::Sim { rig: None };
         let device = run::Device { address: &address, seed: SEED, log_tables: None };
-        let who = run::Who { stage: Stage::Device, yes: true, new_structure: false, stop: stop.clone() };
+        let who = run::Who {
+            stage: Stage::Device,
+            yes: true,
+            new_structure: false,
+            further: None,
+            stop: stop.clone(),
+        };
         run::measure(store, device, who, &mut Onlooker::default(), None, &mut ByRecord)
     }
 }

@@ -8,6 +8,7 @@
 
 use super::bus::Bus;
 use super::message::{Estimate, Message};
+use crate::analyse::next_cell::{Averaged, Times, outlook};
 use crate::analyse::{AnalyseError, Wanted};
 use crate::campaign::plan::configuration_name;
 use crate::campaign::store::Store;
@@ -17,7 +18,7 @@ use crate::campaign::store::rows::Rows;
 use crate::report;
 use crate::report::figure::Figure;
 use crate::report::figure_fragment;
-use crate::report::words::brief;
+use crate::report::words::{brief, next_sentences};
 use crate::results::{Cells, MAIN_BAND, Results};
 use crate::untrusted_text::shown_json;
 use serde::{Deserialize, Serialize};
@@ -125,7 +126,12 @@ impl Found {
             .map_err(AnalyseError::from)
             .and_then(|store| report::analysed(&store, Wanted::default(), &|_| {}));
         match results {
-            Ok(results) => Self::of_results(&results, last),
+            Ok(results) => {
+                let mut found = Self::of_results(&results, last);
+                let known = results.answer.as_ref().is_some_and(|own| own.contact.k_t_n_per_m.is_some());
+                found.estimate.lines.extend(known.then(|| next_cell(path)).flatten());
+                found
+            }
             Err(error) => Self::none(last, error.to_string()),
         }
     }
@@ -153,6 +159,15 @@ impl Found {
             figures: figures.iter().map(|figure| (figure.name.to_owned(), drawn(figure))).collect(),
         }
     }
+}
+
+/// The present interval of k_T and the cell that shrinks it most, as a line for the page; `None`
+/// without a prediction.
+fn next_cell(path: &Path) -> Option<[String; 2]> {
+    let store = Store::open_read_only(path).ok()?;
+    let times = Times::of(&store.plan().ok()?);
+    let found = outlook(&store, times, &mut Averaged::default()).ok()?;
+    Some(["Next cell".into(), next_sentences::best(&found, found.each_cell().first()?)])
 }
 
 /// A figure as JSON for the page: its data, and the static drawing that is shown until the page has

@@ -26,6 +26,7 @@ mod live_spectra;
 mod load_cells;
 mod mishaps;
 mod modes;
+mod next_cell;
 mod own_rig;
 mod plan_command;
 mod python;

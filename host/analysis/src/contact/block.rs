@@ -58,6 +58,12 @@ pub struct Axis {
 /// One cell of a block.
 #[derive(Debug, Clone)]
 pub struct BlockCell {
+    /// Name of its point.
+    pub name: String,
+    /// Number of its hits; none if it is only planned.
+    pub hits: usize,
+    /// The first cell of the block that has the same hits, if that is another one.
+    pub first: Option<usize>,
     /// The body that its point is on.
     pub group: Group,
     /// The axes of its sensor: the channels from 3 on.
@@ -103,6 +109,8 @@ pub struct BlockLine {
 /// All cells of one impact.
 #[derive(Debug, Clone)]
 pub struct Block {
+    /// The impact's name.
+    pub impact: String,
     /// The body that it hits.
     pub grouping: Grouping,
     /// Position of the impact, m.
@@ -145,6 +153,183 @@ impl Block {
     pub fn local(&self, parameter: usize) -> usize {
         self.local[parameter]
     }
+
+    /// Lists the places of the block's parameters among all `count` parameters.
+    fn index(&mut self, count: usize) {
+        self.local = vec![usize::MAX; count];
+        for (place, parameter) in self.parameters.iter().enumerate() {
+            self.local[*parameter] = place;
+        }
+    }
+
+    /// Changes the noise to that of more hits in a cell, and in those that have the same hits;
+    /// The weights are not changed. Returns the changed cells.
+    pub fn hit_again(&mut self, cell: usize, more: usize) -> Vec<usize> {
+        let own: Vec<usize> = (0..self.cells.len())
+            .filter(|other| *other == cell || self.cells[*other].first == Some(cell))
+            .collect();
+        for &at in &own {
+            let hits = self.cells[at].hits;
+            let left = hits.max(1) as f64 / (hits + more).max(1) as f64;
+            for line in &mut self.lines {
+                for (r, _) in self.rows.iter().enumerate().filter(|(_, row)| row.cell == at) {
+                    let floor = floor(line.value[r]);
+                    let noise = noise_power(line.sigma[r], line.value[r]);
+                    line.sigma[r] = (left * noise + floor * floor).sqrt();
+                }
+            }
+            self.cells[at].hits += more;
+        }
+        own
+    }
+}
+
+/// A cell that has no hits yet, measured by the moving vibrometer.
+#[derive(Debug, Clone, Copy)]
+pub struct PlannedCell<'a> {
+    /// The assembly AJB, or B alone.
+    pub structure: Structure,
+    /// The impact's name.
+    pub impact: &'a str,
+    /// The response point's name.
+    pub point: &'a str,
+    /// Position of the response point, m.
+    pub point_m: [f64; 3],
+    /// As in [`ContactCell`].
+    pub point_sigma_m: Option<f64>,
+    /// Grouping of the response point: arm B's interface, or a specimen.
+    pub point_grouping: Grouping,
+    /// The directions along which the point is measured.
+    pub axes: Axes,
+    /// As in [`ContactCell`].
+    pub lasers: bool,
+}
+
+/// Adds a planned cell, without weight, to the block of its impact; returns the block and the
+/// cell's index in it. Its noise is that of a cell of the block on the same body; `seen` predicts
+/// the values of all rows of the block with this index at a line, with these parameters. `None` if
+/// its impact has no block, or no cell of the block is like it.
+pub(super) fn plan_cell(
+    blocks: &mut [Block],
+    planned: &PlannedCell<'_>,
+    input: &Input<'_>,
+    parameters: &mut Parameters,
+    p: &mut Vec<f64>,
+    seen: impl Fn(&Block, usize, usize, &[f64]) -> Vec<Complex<f64>>,
+) -> Option<(usize, usize)> {
+    let priors = &input.priors;
+    let group = Group::of(planned.point_grouping)?;
+    let alone = planned.structure == Structure::B;
+    let b =
+        blocks.iter().position(|block| block.along_z.is_some() == alone && block.impact == planned.impact)?;
+    // specimen B's motion is part of the block only if its points were measured
+    if (group == Group::SpecimenB && blocks[b].specimen_b().is_none()) || (group == Group::SpecimenA && alone)
+    {
+        return None;
+    }
+    let moving = |cell: &&BlockCell| cell.axes.iter().all(|axis| axis.across.is_none());
+    let known = |cell: &&BlockCell| cell.name == planned.point && cell.group == group;
+    let same = blocks.iter().flat_map(|block| &block.cells).filter(moving).find(known);
+    let same = same.map(|cell| (cell.point, cell.axes.clone()));
+    let (point, axes) = same.unwrap_or_else(|| {
+        let (sigma, cause) = of_points(group, priors);
+        let at = relative(planned.point_m, input.contact_m);
+        let axes = axes(planned.point, planned.axes, false, priors, parameters);
+        (position(planned.point, at, planned.point_sigma_m.unwrap_or(sigma), cause, parameters), axes)
+    });
+    let all = blocks.iter().flat_map(|block| &block.cells);
+    let lasers = (planned.lasers && alone).then(|| {
+        let known = all.filter(|cell| cell.name == planned.point).find_map(|cell| cell.lasers);
+        known.unwrap_or_else(|| lasers(planned.point, priors, parameters))
+    });
+    let block = &blocks[b];
+    let likes = |cell: &BlockCell| cell.group == group && cell.hits > 0 && cell.axes.len() == axes.len();
+    let like = block.cells.iter().position(likes)?;
+    let spots = if lasers.is_some() {
+        vec![1, 2]
+    } else {
+        let usual = block.cells.iter().position(|cell| cell.lasers.is_none() && cell.first.is_none())?;
+        let own = block.rows.iter().filter(|row| row.cell == usual && (1..POINT).contains(&row.channel));
+        own.map(|row| row.channel).collect()
+    };
+    let channels: Vec<usize> = std::iter::once(0).chain(spots).chain(POINT..POINT + axes.len()).collect();
+    // the noise of one hit: for load cells and spots from any cell, for the point from one like it
+    let source = |channel: usize| {
+        let fits = |row: &&ChannelRow| row.channel == channel && (channel < POINT || row.cell == like);
+        let row = block.rows.iter().position(|row| fits(&row));
+        // a vibrometer aimed elsewhere has the noise of the other one
+        row.or_else(|| block.rows.iter().position(|row| (1..POINT).contains(&row.channel)))
+    };
+    let sources = channels.iter().map(|channel| source(*channel)).collect::<Option<Vec<usize>>>()?;
+    let aim = priors.positions.aim_m;
+    let named = |what: &str| {
+        let name = format!("the {what}'s aim in {} × {}", planned.impact, planned.point);
+        Parameter::new(name, 0.0, aim, Cause::Aim)
+    };
+    let aimed =
+        (group == Group::ArmB && aim > 0.0).then(|| parameters.add((0..3).map(|_| named("vibrometer"))));
+    let shift =
+        (!block.shifted_by.is_empty() && aim > 0.0).then(|| parameters.add((0..2).map(|_| named("hammer"))));
+    p.extend(parameters.all()[p.len()..].iter().map(|own| own.start));
+    let count = p.len();
+
+    let block = &mut blocks[b];
+    let cell = block.cells.len();
+    let unexplained = block.cells[like].unexplained;
+    let own = (point..point + 3)
+        .chain(lasers.into_iter().flat_map(|at| at..at + 4))
+        .chain(axes.iter().flat_map(|axis| [axis.gain, axis.delay]))
+        .chain(aimed.into_iter().flat_map(|at| at..at + 3))
+        .chain(shift.into_iter().flat_map(|at| at..at + 2));
+    block.parameters.extend(own);
+    block.parameters.sort_unstable();
+    block.parameters.dedup();
+    let name = planned.point.to_owned();
+    block.cells.push(BlockCell {
+        name,
+        hits: 0,
+        first: None,
+        group,
+        axes,
+        point,
+        lasers,
+        aim: aimed,
+        shift,
+        unexplained,
+    });
+    let before = block.rows.len();
+    block.rows.extend(channels.iter().map(|channel| ChannelRow { cell, channel: *channel }));
+    let noises: Vec<Vec<f64>> = (block.lines.iter())
+        .map(|line| {
+            let noise = |from: &usize| {
+                let hits = block.cells[block.rows[*from].cell].hits as f64;
+                hits * noise_power(line.sigma[*from], line.value[*from])
+            };
+            sources.iter().map(noise).collect()
+        })
+        .collect();
+    for block in blocks.iter_mut() {
+        block.index(count);
+    }
+    let values: Vec<Vec<Complex<f64>>> =
+        (0..blocks[b].lines.len()).map(|line| seen(&blocks[b], b, line, p).split_off(before)).collect();
+    for ((line, noises), values) in blocks[b].lines.iter_mut().zip(noises).zip(values) {
+        let sigma = noises.iter().zip(&values).map(|(noise, value)| (noise + floor(*value).powi(2)).sqrt());
+        line.sigma.extend(sigma);
+        line.weight.extend(values.iter().map(|_| 0.0));
+        line.value.extend(values);
+    }
+    Some((b, cell))
+}
+
+/// The part of a signal that counts as noise whatever its noise is.
+fn floor(value: Complex<f64>) -> f64 {
+    RELATIVE_FLOOR * value.norm()
+}
+
+/// The variance that more hits average, of a signal with this standard deviation.
+fn noise_power(sigma: f64, value: Complex<f64>) -> f64 {
+    (sigma * sigma - floor(value).powi(2)).max(0.0)
 }
 
 /// Position, direction and cells of one impact.
@@ -175,23 +360,13 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     for impact in &impacts {
         for (group, cell) in &impact.cells {
             points.entry((*group, cell.point)).or_insert_with(|| {
-                let (sigma, cause) = match group {
-                    Group::ArmB => (input.priors.positions.position_m, Cause::ArmPoints),
-                    _ => (input.priors.specimen_point_m, Cause::SpecimenPoints),
-                };
+                let (sigma, cause) = of_points(*group, &input.priors);
                 let sigma = cell.point_sigma_m.unwrap_or(sigma);
                 let at = relative(cell.point_m, input.contact_m);
-                let axes = axes(cell, &input.priors, parameters);
-                let position = parameters.add(["x", "y", "z"].into_iter().zip(at).map(|(axis, start)| {
-                    Parameter::new(format!("{axis} of point {}", cell.point), start, sigma, cause)
-                }));
-                let aim = |laser: &str, axis: &str| {
-                    let name = format!("{axis} of the aim of spot {laser}'s vibrometer at {}", cell.point);
-                    Parameter::new(name, 0.0, input.priors.positions.aim_m, Cause::Aim)
-                };
-                let lasers = (cell.lasers && impact.structure == Structure::B).then(|| {
-                    parameters.add(["A", "B"].into_iter().flat_map(|of| [aim(of, "x"), aim(of, "y")]))
-                });
+                let axes = axes(cell.point, cell.axes, cell.fixed, &input.priors, parameters);
+                let position = position(cell.point, at, sigma, cause, parameters);
+                let lasers = (cell.lasers && impact.structure == Structure::B)
+                    .then(|| lasers(cell.point, &input.priors, parameters));
                 MeasuredPoint { position, axes, lasers }
             });
         }
@@ -211,12 +386,32 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     }
     let count = parameters.all().len();
     for block in &mut all {
-        block.local = vec![usize::MAX; count];
-        for (place, parameter) in block.parameters.iter().enumerate() {
-            block.local[*parameter] = place;
-        }
+        block.index(count);
     }
     Ok(all)
+}
+
+/// Standard deviation of the position of a body's points, m, and its cause.
+fn of_points(group: Group, priors: &ContactPriors) -> (f64, Cause) {
+    match group {
+        Group::ArmB => (priors.positions.position_m, Cause::ArmPoints),
+        _ => (priors.specimen_point_m, Cause::SpecimenPoints),
+    }
+}
+
+/// Adds the coordinates of a point; returns the index of the first.
+fn position(point: &str, at: [f64; 3], sigma: f64, cause: Cause, parameters: &mut Parameters) -> usize {
+    let own = |(axis, start)| Parameter::new(format!("{axis} of point {point}"), start, sigma, cause);
+    parameters.add(["x", "y", "z"].into_iter().zip(at).map(own))
+}
+
+/// Adds the aims of the vibrometers of both spots at a point; returns the index of the first.
+fn lasers(point: &str, priors: &ContactPriors, parameters: &mut Parameters) -> usize {
+    let aim = |laser: &str, axis: &str| {
+        let name = format!("{axis} of the aim of spot {laser}'s vibrometer at {point}");
+        Parameter::new(name, 0.0, priors.positions.aim_m, Cause::Aim)
+    };
+    parameters.add(["A", "B"].into_iter().flat_map(|of| [aim(of, "x"), aim(of, "y")]))
 }
 
 /// A point, which several impacts may measure.
@@ -231,13 +426,19 @@ struct MeasuredPoint {
 }
 
 /// The axes of a cell's sensor, with the parameters of a fixed one.
-fn axes(cell: &ContactCell<'_>, priors: &ContactPriors, parameters: &mut Parameters) -> Vec<Axis> {
+fn axes(
+    point: &str,
+    axes: Axes,
+    fixed: bool,
+    priors: &ContactPriors,
+    parameters: &mut Parameters,
+) -> Vec<Axis> {
     let own = |(place, direction): (usize, &[f64; 3])| {
         let direction = *direction;
-        if !cell.fixed {
+        if !fixed {
             return Axis { direction, gain: GAINS + 2 + place, delay: DELAYS + 2 + place, across: None };
         }
-        let name = |what: &str| format!("{what} of axis {} of the sensor at {}", place + 1, cell.point);
+        let name = |what: &str| format!("{what} of axis {} of the sensor at {point}", place + 1);
         let gain = parameters.add([
             Parameter::new(name("gain"), 0.0, priors.gain, Cause::Gains),
             Parameter::new(name("delay"), 0.0, priors.skew_s, Cause::Skew),
@@ -251,7 +452,7 @@ fn axes(cell: &ContactCell<'_>, priors: &ContactPriors, parameters: &mut Paramet
         });
         Axis { direction, gain, delay: gain + 1, across: turned }
     };
-    cell.axes.directions().iter().enumerate().map(own).collect()
+    axes.directions().iter().enumerate().map(own).collect()
 }
 
 /// Two unit vectors at right angles to a unit vector and to each other.
@@ -414,7 +615,19 @@ fn block(
         let channels = of_all.chain(POINT..POINT + axes.len());
         rows.extend(channels.map(|channel| ChannelRow { cell: place, channel }));
         let (group, unexplained) = (*group, [0.0; 2]);
-        cells.push(BlockCell { group, axes, point, lasers, aim: aimed, shift, unexplained });
+        let (name, hits) = (cell.point.to_owned(), cell.spectra.hits());
+        cells.push(BlockCell {
+            name,
+            hits,
+            first,
+            group,
+            axes,
+            point,
+            lasers,
+            aim: aimed,
+            shift,
+            unexplained,
+        });
         lines.push(cell_values(cell, chosen, input.band_hz)?);
     }
     pool_lines(&mut lines).ok_or_else(|| ContactError::SingleHits { impact: impact.name.into() })?;
@@ -437,6 +650,7 @@ fn block(
         })
     };
     Ok(Block {
+        impact: impact.name.to_owned(),
         aim_known,
         grouping: impact.grouping,
         at_m: impact.at_m,
@@ -681,7 +895,7 @@ impl CellValues {
     pub fn sigma(&self, line: usize, channel: usize, s: Complex<f64>) -> f64 {
         let power = self.noise[channel] / (self.force[line] * self.hits as f64);
         let noise = power / s.norm_sqr().powi(self.order[channel]);
-        (noise + (RELATIVE_FLOOR * self.value[line][channel].norm()).powi(2)).sqrt()
+        (noise + floor(self.value[line][channel]).powi(2)).sqrt()
     }
 
     /// Whether a channel has a finite value and a known noise at a line.

@@ -32,6 +32,7 @@
 //! - `contradictions`: stated quantities that the data contradict
 //! - `outcome`: the result and the sources of its uncertainty, tests of the assumptions, and the
 //!   band in which the bodies are rigid
+//! - `forecast`: k_T's interval after further hits, without another fit
 //! - `driven`: the rotation of the bodies while the shaker runs
 //! - `levels`: k_T of the shaker's levels, given the result of the hits; the average of both
 
@@ -43,6 +44,9 @@ mod driven;
 mod elastic;
 #[cfg(test)]
 mod fixed_tests;
+mod forecast;
+#[cfg(test)]
+mod forecast_tests;
 mod known_mass;
 mod levels;
 #[cfg(test)]
@@ -54,9 +58,10 @@ mod solver;
 #[cfg(test)]
 mod tests;
 
-pub use block::{Axes, ContactCell, SIGMA_PER_S, determines_motion};
+pub use block::{Axes, ContactCell, PlannedCell, SIGMA_PER_S, determines_motion};
 pub use contradictions::Contradiction;
 pub use elastic::Bulk;
+pub use forecast::{Forecast, ForecastCell, forecast};
 pub use known_mass::{KnownMass, mass_ratio};
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
@@ -235,6 +240,14 @@ impl Known {
 /// # Errors
 /// As [`stiffness`].
 pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
+    let (found, fit) = fitted(input)?;
+    let Fit { parameters, solution, .. } = fit;
+    let Solution { p, certainty, chi_square, .. } = solution;
+    Ok((found, Known { p, parameters, certainty, misfit: chi_square.max(1.0) }))
+}
+
+/// The result, with the fit that it comes from.
+fn fitted(input: &Input<'_>) -> Result<(Stiffness, Fit), ContactError> {
     let mut input = input.clone();
     loop {
         let prepared = Prepared::new(&input)?;
@@ -266,11 +279,8 @@ struct Fit {
 }
 
 impl Fit {
-    fn told(self, input: &Input<'_>, changes: &Changes) -> Result<(Stiffness, Known), ContactError> {
-        let found = outcome::of(input, &self, changes)?;
-        let Fit { parameters, solution, .. } = self;
-        let Solution { p, certainty, chi_square, .. } = solution;
-        Ok((found, Known { p, parameters, certainty, misfit: chi_square.max(1.0) }))
+    fn told(self, input: &Input<'_>, changes: &Changes) -> Result<(Stiffness, Fit), ContactError> {
+        Ok((outcome::of(input, &self, changes)?, self))
     }
 }
 

@@ -8,7 +8,7 @@
 //! weights of the others stay the same.
 
 use super::ContactError;
-use super::block::Block;
+use super::block::{Block, BlockCell, BlockLine};
 use super::model::{Normal, Residual};
 use super::parameters::{COMPLIANCE, HAMMER, Parameters};
 use crate::errors_in_variables::NoiseInflation;
@@ -392,7 +392,8 @@ pub fn certainty(
     Ok(Certainty { answer: inverse(1), covariance: inverse(2) })
 }
 
-fn of_noise(blocks: &[Block], bin: &Bin, p: &[f64]) -> Normal {
+/// What noise alone contributes to the information of a bin.
+pub fn of_noise(blocks: &[Block], bin: &Bin, p: &[f64]) -> Normal {
     let block = &blocks[bin.block];
     let mut normal = Normal::none(block.parameters.len());
     for residual in &bin.residuals {
@@ -453,22 +454,38 @@ fn bin(
     let mut motion = Vec::with_capacity(lines.len());
     let mut residuals = Vec::with_capacity(lines.len());
     for line in lines {
-        let shifts = before.filter(|_| !block.shifted_by.is_empty()).map(|motion| {
-            [0, 1].map(|axis| {
-                let mut shift = DVector::zeros(block.latent());
-                for (other, weights) in &block.shifted_by {
-                    if let Some(moved) = motion[*other].get(line) {
-                        shift += moved * Complex::from(weights[axis]);
-                    }
-                }
-                shift
-            })
-        });
+        let shifts = before.and_then(|motion| shifts(block, motion, line));
         let (moved, residual) = normal.add(block, line, p, shifts.as_ref())?;
         motion.push(moved);
         residuals.push(residual);
     }
     Some(Bin { block: b, low_hz, normal, residuals, motion })
+}
+
+/// The motion that a shift of the impact by one metre along each of two axes adds at a line; `None`
+/// if it is not known.
+fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Complex<f64>>; 2]> {
+    (!block.shifted_by.is_empty()).then(|| {
+        [0, 1].map(|axis| {
+            let mut shift = DVector::zeros(block.latent());
+            for (other, weights) in &block.shifted_by {
+                if let Some(moved) = motion[*other].get(line) {
+                    shift += moved * Complex::from(weights[axis]);
+                }
+            }
+            shift
+        })
+    })
+}
+
+/// Information of all lines of a block, over its parameters; `None` if its rows do not determine
+/// the motion.
+pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
+    let mut normal = Normal::none(block.parameters.len());
+    for line in 0..block.lines.len() {
+        normal.add(block, line, p, shifts(block, motion, line).as_ref())?;
+    }
+    Some(normal.information / shared)
 }
 
 /// The best-fitting motion of each line, by block.
@@ -519,21 +536,7 @@ type Seen = [f64; 4];
 pub fn widen(blocks: &mut [Block], left: &[(usize, &Residual)]) -> bool {
     let mut changed = false;
     for (b, block) in blocks.iter_mut().enumerate() {
-        let mut seen: Vec<[Vec<Seen>; 2]> = vec![[Vec::new(), Vec::new()]; block.cells.len()];
-        for (_, residual) in left.iter().filter(|(of, _)| *of == b) {
-            let line = &block.lines[residual.line];
-            for (r, row) in block.rows.iter().enumerate() {
-                let (left, free) = residual.rows[r];
-                let variance = line.weight[r].powi(-2);
-                let instrument = usize::from(row.channel >= 3);
-                seen[row.cell][instrument].push([
-                    left.norm_sqr() * variance,
-                    free,
-                    line.sigma[r].powi(2),
-                    line.value[r].norm_sqr(),
-                ]);
-            }
-        }
+        let seen = seen_by_cell(block, left.iter().filter(|(of, _)| *of == b).map(|(_, own)| *own));
         for (cell, seen) in block.cells.iter_mut().zip(&seen) {
             for (part, seen) in cell.unexplained.iter_mut().zip(seen) {
                 let found = part_of_signal(seen);
@@ -541,27 +544,111 @@ pub fn widen(blocks: &mut [Block], left: &[(usize, &Residual)]) -> bool {
                 *part = found;
             }
         }
-        let parts: Vec<f64> = (block.rows.iter())
-            .map(|row| block.cells[row.cell].unexplained[usize::from(row.channel >= 3)])
-            .collect();
-        for line in &mut block.lines {
-            for (r, part) in parts.iter().enumerate() {
-                let alike = ALIKE * part * line.value[r].norm();
-                line.weight[r] = line.sigma[r].hypot(alike).recip();
-            }
-        }
+        weigh(block);
     }
     changed
+}
+
+/// The rows of a block's lines by cell and instrument (load cells and spots, or the point).
+fn seen_by_cell<'a>(block: &Block, left: impl Iterator<Item = &'a Residual>) -> Vec<[Vec<Seen>; 2]> {
+    let mut seen: Vec<[Vec<Seen>; 2]> = vec![[Vec::new(), Vec::new()]; block.cells.len()];
+    for residual in left {
+        let line = &block.lines[residual.line];
+        for (r, row) in block.rows.iter().enumerate() {
+            let (left, free) = residual.rows[r];
+            let variance = line.weight[r].powi(-2);
+            let instrument = usize::from(row.channel >= 3);
+            seen[row.cell][instrument].push([
+                left.norm_sqr() * variance,
+                free,
+                line.sigma[r].powi(2),
+                line.value[r].norm_sqr(),
+            ]);
+        }
+    }
+    seen
+}
+
+/// The fraction of the signal that the model leaves unexplained, for each block, cell and
+/// instrument, whether or not it is significant yet: that of the cell, but at least that of all such
+/// cells of the structure together. As hits lower the noise, it becomes visible.
+pub fn latent(blocks: &[Block], bins: &[Bin]) -> Vec<Vec<[f64; 2]>> {
+    let seen: Vec<Vec<[Vec<Seen>; 2]>> = (blocks.iter().enumerate())
+        .map(|(b, block)| {
+            seen_by_cell(block, bins.iter().filter(|bin| bin.block == b).flat_map(|bin| &bin.residuals))
+        })
+        .collect();
+    let pooled = |alone: bool, instrument: usize| {
+        let own = (blocks.iter().zip(&seen)).filter(|(block, _)| block.along_z.is_some() == alone);
+        let rows: Vec<Seen> = own
+            .flat_map(|(block, seen)| block.cells.iter().zip(seen))
+            .filter(|(cell, _)| cell.unexplained[instrument] == 0.0)
+            .flat_map(|(_, seen)| seen[instrument].iter().copied())
+            .collect();
+        excess(&rows, 1.0)
+    };
+    let pools = [false, true].map(|alone| [0, 1].map(|instrument| pooled(alone, instrument)));
+    (blocks.iter().zip(&seen))
+        .map(|(block, seen)| {
+            let pools = pools[usize::from(block.along_z.is_some())];
+            let of_cell = |(cell, seen): (&BlockCell, &[Vec<Seen>; 2])| {
+                [0, 1].map(|instrument| match cell.unexplained[instrument] {
+                    0.0 => excess(&seen[instrument], 1.0).max(pools[instrument]),
+                    known => known,
+                })
+            };
+            block.cells.iter().zip(seen).map(of_cell).collect()
+        })
+        .collect()
+}
+
+/// Counts the unexplained fraction of a cell's signals that [`latent`] found, once the noise is so
+/// low that [`widen`] would.
+pub fn reveal(block: &mut Block, cell: usize, latent: [f64; 2]) {
+    for (instrument, part) in latent.into_iter().enumerate() {
+        let rows: Vec<usize> = (0..block.rows.len())
+            .filter(|r| block.rows[*r].cell == cell && usize::from(block.rows[*r].channel >= 3) == instrument)
+            .collect();
+        let over = |line: &BlockLine, r: usize| (part * line.value[r].norm() / line.sigma[r]).powi(2);
+        let all = block.lines.iter().flat_map(|line| rows.iter().map(move |r| over(line, *r)));
+        let mean = all.sum::<f64>() / (rows.len() * block.lines.len()).max(1) as f64;
+        let unexplained = &mut block.cells[cell].unexplained[instrument];
+        if 1.0 + mean > STRAYS && part > *unexplained {
+            *unexplained = part;
+        }
+    }
+}
+
+/// Sets the weights of a block from its noise and the fractions of the signals that are not
+/// explained; a cell without hits has none.
+pub fn weigh(block: &mut Block) {
+    let parts: Vec<Option<f64>> = (block.rows.iter())
+        .map(|row| {
+            let cell = &block.cells[row.cell];
+            (cell.hits > 0).then(|| cell.unexplained[usize::from(row.channel >= 3)])
+        })
+        .collect();
+    for line in &mut block.lines {
+        for (r, part) in parts.iter().enumerate() {
+            let alike = part.map(|part| ALIKE * part * line.value[r].norm());
+            line.weight[r] = alike.map_or(0.0, |alike| line.sigma[r].hypot(alike).recip());
+        }
+    }
 }
 
 /// The fraction of the signal to be added to the noise so that χ² has its expected value; 0 if χ²
 /// is close enough already.
 fn part_of_signal(seen: &[Seen]) -> f64 {
+    excess(seen, STRAYS)
+}
+
+/// The same with χ² close enough up to `allowed` times its expected value.
+fn excess(seen: &[Seen], allowed: f64) -> f64 {
     let expected: f64 = seen.iter().map(|[_, free, ..]| free).sum();
     let chi = |part: f64| -> f64 {
         seen.iter().map(|[left, _, variance, signal]| left / (variance + part * part * signal)).sum()
     };
-    if expected < 1.0 || chi(0.0) <= STRAYS * expected {
+    if expected < 1.0 || chi(0.0) <= allowed * expected {
         return 0.0;
     }
     let mut high = 1e-3;

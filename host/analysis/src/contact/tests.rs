@@ -38,32 +38,32 @@ const AXIAL: f64 = 5.0 / 6.0 / 2.6;
 
 /// The errors that a test introduces.
 #[derive(Clone, Copy)]
-struct World {
-    noise_m_per_s: f64,
+pub(super) struct World {
+    pub(super) noise_m_per_s: f64,
     /// Error of the spot on A, m.
-    spot_m: f64,
+    pub(super) spot_m: f64,
     /// Distance of a point on specimen A from its stated position, m.
-    misplaced_m: f64,
+    pub(super) misplaced_m: f64,
     /// Frequency of a bending mode that the first point on specimen A takes part in, Hz.
-    bends_hz: Option<f64>,
+    pub(super) bends_hz: Option<f64>,
     /// Shear and bending compliance of specimen A (1/N, 1/(N m²)), clamped at 12 mm.
-    bulk: [f64; 2],
+    pub(super) bulk: [f64; 2],
     /// Compliance of specimen B against arm B (m/N), and the part of it that is rotation, 1/m.
-    tip: [f64; 2],
+    pub(super) tip: [f64; 2],
     /// Relative errors of gain of the vibrometers of spots A and B.
-    gains: [f64; 2],
+    pub(super) gains: [f64; 2],
     /// Whether both are aimed near the third point of arm B while B alone is measured.
-    together: bool,
+    pub(super) together: bool,
     /// Relative error of the hammer's gain.
-    hammer: f64,
+    pub(super) hammer: f64,
     /// Seed of the noise.
-    seed: u64,
+    pub(super) seed: u64,
 }
 
 /// Where the two are aimed, relative to the point, m.
 const AIMED: [[f64; 3]; 2] = [[2e-4, -1e-4, 0.0], [-1e-4, 2e-4, 0.0]];
 
-struct Cell {
+pub(super) struct Cell {
     structure: Structure,
     impact: usize,
     point: usize,
@@ -93,7 +93,7 @@ pub(super) fn moved(t: [C; 3], turn: [C; 3], r: [f64; 3]) -> [C; 3] {
 }
 
 /// Two hits of every cell.
-fn measured(world: World) -> Vec<Cell> {
+pub(super) fn measured(world: World) -> Vec<Cell> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let mut scatter = Xoshiro256PlusPlus::seed_from_u64(world.seed);
     let frequency_hz: Vec<f64> = (200..=1200).map(|l| 0.5 * f64::from(l)).collect();
@@ -237,7 +237,7 @@ fn of(cell: &Cell) -> ContactCell<'_> {
     }
 }
 
-fn input(cells: &[Cell]) -> Input<'_> {
+pub(super) fn input(cells: &[Cell]) -> Input<'_> {
     // aims and gains are exact here: the test is of spots, points and noise
     let mut priors = ContactPriors { gain: 0.0, hammer_gain: 0.0, skew_s: 0.0, ..ContactPriors::default() };
     priors.positions.aim_m = 0.0;
@@ -256,7 +256,7 @@ fn input(cells: &[Cell]) -> Input<'_> {
     }
 }
 
-const QUIET: World = World {
+pub(super) const QUIET: World = World {
     noise_m_per_s: 2e-9,
     spot_m: 0.0,
     misplaced_m: 0.0,

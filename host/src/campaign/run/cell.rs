@@ -23,6 +23,7 @@ use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Quantity;
 use jointrig_protocol::shot::Shot;
+use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 /// Shots of one cell that may be cancelled or find no quiet before the cell is given up.
@@ -32,7 +33,13 @@ impl Runner<'_> {
     /// Measures one cell until it has enough good hits or is given up with a reason.
     pub(super) fn cell(&mut self, row: &CellRow) -> Result<Next, RunError> {
         let responses = self.responses(row);
-        let (mut others, mut again) = self.earlier.of(row.id, &responses, self.plan, self.channels)?;
+        let (mut others, mut again) = if self.visit.is_some() {
+            still(self.keeper.catch_up())?;
+            let others = self.earlier.others_now(row.id, &responses, self.plan, self.channels)?;
+            (others, VecDeque::new())
+        } else {
+            self.earlier.of(row.id, &responses, self.plan, self.channels)?
+        };
         // manual hits cannot be repeated
         if self.stage != Stage::Device || self.plan.by_hand().is_some() {
             again.clear();
@@ -184,6 +191,10 @@ impl Runner<'_> {
     fn ended(&mut self, row: &CellRow, others: &Others) -> Result<bool, RunError> {
         let hits = self.plan.hits.get_ref();
         let (kept, attempts) = (self.tally.kept_in(row.id), self.tally.attempts(row.id));
+        if let Some(before) = self.visit {
+            // a cell that further hits are chosen for keeps what it has, whatever this visit gives
+            return Ok(attempts >= before + hits.most.max(row.cell.wanted));
+        }
         let enough = self.plan.enough.as_ref().map(toml::Spanned::get_ref).filter(|_| kept >= hits.minimum);
         let reason = if attempts >= hits.most {
             format!("{kept} of {} good after {attempts} hits", row.cell.wanted)
@@ -240,6 +251,13 @@ impl Runner<'_> {
     }
 
     fn give_up(&mut self, row: &CellRow, reason: &str) -> Result<(), RunError> {
+        if self.visit.is_some() {
+            // its good hits stay in use
+            self.excluded.insert(row.id);
+            let text = format!("{}: no further hits in this run: {reason}", name(&row.cell));
+            self.saw(&Seen::Remark(&text));
+            return still(self.keeper.log(text));
+        }
         self.tally.give_up(row.id);
         self.saw(&Seen::Remark(&format!("{}: given up: {reason}", name(&row.cell))));
         still(self.keeper.give_up(row.id, reason))
@@ -333,7 +351,8 @@ impl Runner<'_> {
     pub(super) fn left(&self, row: &CellRow) -> Left {
         let mut left = Left::default();
         for other in self.cells.iter().filter(|other| self.tally.open(other.id)) {
-            let missing = u64::from(other.cell.wanted.saturating_sub(self.tally.kept_in(other.id)));
+            let wanted = self.tally.wanted_in(other.id);
+            let missing = u64::from(wanted.saturating_sub(self.tally.kept_in(other.id)));
             left.campaign += missing;
             left.configuration +=
                 if other.cell.configuration == row.cell.configuration { missing } else { 0 };

@@ -38,6 +38,9 @@ pub enum RunError {
         /// How long the run waited, s.
         seconds: f64,
     },
+    /// Further cells could not be chosen.
+    #[error("choosing further cells: {0}; nothing accepted is lost: run the same command again")]
+    Further(String),
     /// The rig is not safe to strike.
     #[error("{0}; nothing accepted is lost: run the same command again")]
     Unsafe(&'static str),

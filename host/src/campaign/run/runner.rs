@@ -16,11 +16,12 @@ use super::answers::Answers;
 use super::answers::{Edits, Recount};
 use super::clock::ScanClock;
 use super::error::RunError;
+use super::further::{Choice, Further, FurtherCell};
 use super::keeper::{Announced, Keeper};
 use super::pulse::{FIRST_SLOPE, PulseHit, PulseLoop, fitted, strikes_in_time};
 use super::shot::Shooter;
 use super::stage::Stage;
-use super::stage::same_or_accepted;
+use super::stage::{meanwhile, same_or_accepted};
 use super::tally::Tally;
 use crate::campaign::plan::{Force, Plan};
 use crate::campaign::store::Store;
@@ -61,6 +62,9 @@ pub struct Options {
     pub edits: Option<Edits>,
     /// Answers to the stage's questions from other places than the terminal.
     pub answers: Option<Answers>,
+    /// Chooses further cells once every cell has the plan's fewest good hits; if absent, every cell
+    /// gets the hits that the plan wants, and the run ends.
+    pub further: Option<Further>,
     /// Set to end the run after the current shot.
     pub stop: Arc<AtomicBool>,
 }
@@ -80,6 +84,9 @@ pub struct Summary {
     pub hits: u64,
     /// Accounting of every scan of the stream.
     pub accounts: Accounts,
+    /// Whether further cells reached what they were measured for, and why the run ended with them;
+    /// `None` without them, or if the run was interrupted.
+    pub further: Option<(bool, String)>,
 }
 
 /// Runs the campaign in `store` on the device behind `session` until every cell is complete or
@@ -137,6 +144,13 @@ pub fn run(
         store.note_simulated(simulated)?;
     }
     let (mut cells, records) = (store.cells()?, store.records()?);
+    if options.further.is_some() {
+        // the chooser decides which cells get more
+        let minimum = plan.hits.get_ref().minimum;
+        for row in &mut cells {
+            row.cell.wanted = row.cell.wanted.min(minimum);
+        }
+    }
     let rows = Rows::new(&plan, &cells);
     let tally = Tally::new(&cells, rows.clone(), &records);
     // cells that are filled by the hits of another cell are not visited
@@ -182,9 +196,11 @@ pub fn run(
         session_id: id,
         tally,
         reopened: BTreeSet::new(),
+        visit: None,
+        excluded: BTreeSet::new(),
         hits: 0,
     };
-    let walked = runner.walk();
+    let walked = runner.walk().and_then(|()| runner.walk_further());
     runner.end(walked)
 }
 
@@ -216,6 +232,11 @@ pub(super) struct Runner<'a> {
     pub(super) tally: Tally,
     /// Cells that lost a good hit in this run because a person overruled it.
     reopened: BTreeSet<i64>,
+    /// The number of attempts in the cell before the present visit, if it is one of the further
+    /// cells.
+    pub(super) visit: Option<u32>,
+    /// Further cells that cannot be measured in this run.
+    pub(super) excluded: BTreeSet<i64>,
     pub(super) hits: u64,
 }
 
@@ -264,6 +285,59 @@ impl Runner<'_> {
                     true
                 }
             };
+        }
+        Ok(())
+    }
+
+    /// Measures further cells until the chooser has enough; returns whether it has what it was to
+    /// measure, and why it ended.
+    fn walk_further(&mut self) -> Result<Option<(bool, String)>, RunError> {
+        let Some(further) = &self.options.further else { return Ok(None) };
+        while !self.stopped() {
+            still(self.keeper.catch_up())?;
+            let (path, cells, excluded) = (self.earlier.path.clone(), self.cells, self.excluded.clone());
+            let choose = move || {
+                let out =
+                    |cell: &FurtherCell| cells.iter().any(|row| cell.is(row) && excluded.contains(&row.id));
+                further.chooser().next(&path, &out).map_err(RunError::Further)
+            };
+            // the clock of a device that moves hammer and laser itself stands still meanwhile
+            let choice =
+                if self.stage == Stage::Device { choose()? } else { meanwhile(self.session, choose)? };
+            let (Choice::Cells { why, .. } | Choice::Enough { why, .. }) = &choice;
+            self.saw(&Seen::Remark(why));
+            still(self.keeper.log(why.clone()))?;
+            let chosen = match choice {
+                Choice::Enough { reached, why } => return Ok(Some((reached, why))),
+                Choice::Cells { cells, .. } => cells,
+            };
+            for cell in chosen {
+                if self.stopped() {
+                    break;
+                }
+                self.recount(None);
+                let row = cells.iter().find(|row| cell.is(row));
+                let row = row.ok_or_else(|| {
+                    let FurtherCell { configuration, impact, response, .. } = &cell;
+                    RunError::Further(format!("the plan has no cell {configuration} {impact}, {response}"))
+                })?;
+                self.visit(row, cell.more)?;
+            }
+        }
+        Ok(None)
+    }
+
+    /// Adds good hits to a cell.
+    fn visit(&mut self, row: &CellRow, more: u32) -> Result<(), RunError> {
+        let mut row = row.clone();
+        row.cell.wanted = self.tally.want(row.id, more);
+        self.visit = Some(self.tally.attempts(row.id));
+        let kept = self.tally.kept_in(row.id);
+        self.cell(&row)?;
+        self.visit = None;
+        if self.tally.kept_in(row.id) <= kept && !self.stopped() {
+            // skipped, or without a good hit: another cell is better
+            self.excluded.insert(row.id);
         }
         Ok(())
     }
@@ -359,9 +433,14 @@ impl Runner<'_> {
     }
 
     /// Ends stream and file; of two errors the first one is returned.
-    fn end(mut self, walked: Result<(), RunError>) -> Result<Summary, RunError> {
+    fn end(mut self, walked: Result<Option<(bool, String)>, RunError>) -> Result<Summary, RunError> {
         self.saw(&Seen::Ended);
-        let walked = walked.and_then(|()| if self.hits > 0 { self.keep_temperature() } else { Ok(()) });
+        let walked = walked.and_then(|further| {
+            if self.hits > 0 {
+                self.keep_temperature()?;
+            }
+            Ok(further)
+        });
         let accounts = if walked.is_ok() {
             self.session.disarm().and_then(|()| self.session.finish())
         } else {
@@ -394,10 +473,10 @@ impl Runner<'_> {
         let _ = self.keep_log();
         let closed = self.keeper.finish();
         match &walked {
-            Err(RunError::KeeperGone) | Ok(()) => closed?,
+            Err(RunError::KeeperGone) | Ok(_) => closed?,
             Err(_) => {}
         }
-        walked?;
+        let further = walked?;
         Ok(Summary {
             interrupted: self.options.stop.load(Ordering::Relaxed),
             kept: self.tally.kept(),
@@ -405,6 +484,7 @@ impl Runner<'_> {
             given_up: self.tally.given_up(),
             hits: self.hits,
             accounts: accounts?,
+            further,
         })
     }
 }
@@ -469,8 +549,11 @@ impl Earlier {
         let others = learnt(&store, records, responses, plan, channels)?;
         let mut again: Vec<RecordRow> = records.iter().flatten().cloned().collect();
         again.sort_by_key(|record| record.attempt);
-        let whole =
-            again.len() == records.len() && again.iter().zip(0..).all(|(record, n)| record.attempt == n);
+        // a cell that was left and visited again was at rest in between
+        let one_visit = again.windows(2).all(|pair| pair[1].id == pair[0].id + 1);
+        let whole = one_visit
+            && again.len() == records.len()
+            && again.iter().zip(0..).all(|(record, n)| record.attempt == n);
         Ok((others, if whole { again.into() } else { VecDeque::new() }))
     }
 

@@ -136,11 +136,12 @@ impl Stage {
     }
 }
 
-/// Keeps the stream running while things are moved; what is measured meanwhile is discarded.
-fn meanwhile<T: Send>(
+/// Keeps the stream running while things are moved, or while something is computed; what is
+/// measured meanwhile is discarded.
+pub(super) fn meanwhile<T: Send, E: From<DeviceError> + Send>(
     session: &mut Session,
-    work: impl FnOnce() -> Result<T, StageError> + Send,
-) -> Result<T, StageError> {
+    work: impl FnOnce() -> Result<T, E> + Send,
+) -> Result<T, E> {
     session.hold_acknowledgement(None);
     std::thread::scope(|scope| {
         let worker = scope.spawn(work);

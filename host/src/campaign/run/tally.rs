@@ -125,6 +125,18 @@ impl Tally {
         });
     }
 
+    /// Wants this many good hits more than the cell has; returns how many that are in all.
+    pub fn want(&mut self, id: i64, more: u32) -> u32 {
+        let wanted = self.kept_in(id) + more;
+        self.filled(id, |count| (count.wanted, count.settled) = (wanted, false));
+        wanted
+    }
+
+    /// Good hits wanted in the cell.
+    pub fn wanted_in(&self, id: i64) -> u32 {
+        self.cells.get(&id).map_or(0, |count| count.wanted)
+    }
+
     /// Marks a cell as done with the hits that it has.
     pub fn settle(&mut self, id: i64) {
         self.filled(id, |count| count.settled = true);

@@ -1,4 +1,4 @@
-//! `campaign new | run | status | show | drop | keep | calibrate | check | verify | backup`.
+//! `campaign new | run | next | status | show | drop | keep | calibrate | check | verify | backup`.
 //!
 //! `campaign backup`: a verified copy, even while the campaign runs.
 //!
@@ -19,6 +19,7 @@ use std::path::PathBuf;
 
 mod calibrate;
 mod check;
+mod next;
 pub mod run;
 mod show;
 mod status;
@@ -37,6 +38,8 @@ enum Command {
     New(New),
     /// Measure what is missing; resumes where it stopped.
     Run(run::Run),
+    /// Show which further cells shrink k_T's interval most per minute.
+    Next(next::Next),
     /// Show, per cell, the hits wanted, kept and refused, and why.
     Status(status::Status),
     /// Show a cell: its records, their verdicts, and a figure.
@@ -60,6 +63,7 @@ impl Campaign {
         match self.command {
             Command::New(command) => command.run(),
             Command::Run(command) => command.run(),
+            Command::Next(command) => command.run(),
             Command::Status(command) => command.run(),
             Command::Show(command) => command.run(),
             Command::Drop(command) => command.drop(),

@@ -1,8 +1,9 @@
 //! `campaign run`: measures what is missing. `demo` runs its campaign by the same function.
 
-use super::calibrate;
+use super::{calibrate, next};
 use crate::advice::{quoted, quoted_word};
 use crate::campaign::plan::{Cell, Plan};
+use crate::campaign::run::further::Further;
 use crate::campaign::run::progress::CampaignProgress;
 use crate::campaign::run::runner;
 use crate::campaign::run::runner::{Options, Summary};
@@ -55,6 +56,15 @@ pub struct Run {
     /// report notes it.
     #[arg(long)]
     new_structure: bool,
+    /// Measure the fewest good hits of each cell, and then the cells that shrink k_T's interval most
+    /// per minute, until its relative half width is this, such as 2%.
+    #[arg(long, value_name = "PERCENT", value_parser = next::percent)]
+    until: Option<f64>,
+    /// Largest number of further hits in this run, with --until.
+    #[arg(long, value_name = "N", default_value_t = next::FURTHER_HITS, requires = "until")]
+    further_hits: usize,
+    #[command(flatten)]
+    durations: next::Durations,
     /// Ring the terminal's bell at every verdict, twice if the hit is refused.
     #[arg(long)]
     bell: bool,
@@ -86,6 +96,9 @@ impl Run {
             new_structure: false,
             plan: None,
             calibration: None,
+            until: None,
+            further_hits: next::FURTHER_HITS,
+            durations: next::Durations::default(),
             bell: false,
             seed: 1,
             log_tables: None,
@@ -106,13 +119,21 @@ impl Run {
         let stop = output::flag();
         let mut onlooker = self.page.start(Some(&self.file), &stop, self.allows_control())?;
         let device = quoted_word(&address.to_string());
-        let again = format!("jointrig campaign run {} --device {device}", quoted(&self.file));
+        let until = self.until.map_or(String::new(), |until| format!(" --until {}%", 100.0 * until));
+        let again = format!("jointrig campaign run {} --device {device}{until}", quoted(&self.file));
         let device = Device { address: &address, seed: self.seed, log_tables: self.log_tables };
-        let who = Who { stage: self.stage, yes: self.yes, new_structure: self.new_structure, stop };
+        let further = self.until.map(|until| {
+            next::Until::new(&store, until, self.durations, self.further_hits).map(Further::new)
+        });
+        let further = further.transpose()?;
+        let who = Who { stage: self.stage, yes: self.yes, new_structure: self.new_structure, further, stop };
         let mut judge = Ringing { rings: self.bell };
         let summary = measure(store, device, who, &mut onlooker, Some(&again), &mut judge)?;
         if summary.interrupted {
             return Err(CliError::Bad("stopped before the campaign was complete".into()));
+        }
+        if let Some((false, why)) = summary.further {
+            return Err(CliError::Bad(why));
         }
         Ok(())
     }
@@ -199,6 +220,8 @@ pub struct Who {
     pub yes: bool,
     /// Whether another structure than that of the file's records is accepted.
     pub new_structure: bool,
+    /// Chooses further cells, if any are wanted.
+    pub further: Option<Further>,
     /// Set to end after the current shot.
     pub stop: Arc<AtomicBool>,
 }
@@ -218,10 +241,10 @@ pub fn measure(
     let mut session = Session::open(address.open(seed)?, &address.to_string())?;
     session.look_for_log_tables(Tables::new(log_tables));
     onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
-    let Who { stage, yes, new_structure, stop } = who;
+    let Who { stage, yes, new_structure, further, stop } = who;
     let watch = onlooker.watch.clone().and(Arc::new(CampaignProgress::default()));
     let (edits, answers) = (onlooker.edits.take(), onlooker.answers.take());
-    let options = Options { stage, yes, new_structure, watch, edits, answers, stop };
+    let options = Options { stage, yes, new_structure, watch, edits, answers, further, stop };
     let summary = runner::run(store, &mut session, judge, &options)?;
     tell(&path, &summary, again);
     tell_size(&path)?;
@@ -244,7 +267,7 @@ fn tell_size(path: &Path) -> Result<(), CliError> {
 }
 
 fn tell(path: &Path, summary: &Summary, again: Option<&str>) {
-    let Summary { kept, wanted, hits, given_up, accounts, .. } = summary;
+    let Summary { kept, wanted, hits, given_up, accounts, further, .. } = summary;
     tell_line!("{}: {kept} of {wanted} good hits kept ({hits} struck in this run)", path.display());
     if *given_up > 0 {
         tell_line!("{given_up} cells were given up: `jointrig campaign status {}` says why", quoted(path));
@@ -255,6 +278,9 @@ fn tell(path: &Path, summary: &Summary, again: Option<&str>) {
             accounts.lost,
             accounts.unexplained()
         );
+    }
+    if let Some((true, why)) = further {
+        tell_line!("{why}");
     }
     if summary.interrupted
         && let Some(again) = again

@@ -68,7 +68,8 @@ pub fn expected(all: &[Expected]) -> Vec<String> {
     lines
 }
 
-fn of_cause(cause: Cause) -> &'static str {
+/// A cause of uncertainty in words.
+pub fn of_cause(cause: Cause) -> &'static str {
     match cause {
         Cause::Noise => "noise",
         Cause::Spots => "the positions of the spots next to the contact",

@@ -7,6 +7,7 @@ pub(super) mod check_sentences;
 pub(super) mod level_sentences;
 pub mod mode_sentences;
 mod names;
+pub mod next_sentences;
 pub mod number;
 pub mod side_by_side;
 mod summary;

@@ -49,6 +49,7 @@ pub fn options() -> Options {
         watch: Watchers::default(),
         edits: None,
         answers: None,
+        further: None,
         stop: Arc::default(),
     }
 }
