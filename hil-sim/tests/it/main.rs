@@ -23,3 +23,4 @@ mod stepping;
 mod supplies;
 mod support;
 mod sync;
+mod wear;
