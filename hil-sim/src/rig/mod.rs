@@ -437,8 +437,8 @@ impl Rig {
     /// Applies the law of wear in the middle of the motion.
     ///
     /// # Panics
-    /// Never: [`Rig::with_stepping`] has built the unworn and the fully worn contact, and all others
-    /// lie between them.
+    /// Never: [`Rig::with_stepping`] has built the unworn and the fully worn contact, and all
+    /// others lie between them.
     fn wear(&mut self) {
         let worn_j = self.worn_j();
         self.steady_until_j = self.steady_until(worn_j);
