@@ -51,6 +51,9 @@ pub struct Options {
     /// For an emulated board: its link is UART 0, connected to this target (QEMU's `-serial`), and
     /// the returned host end is not used. Such a run is not repeatable.
     pub uart: Option<String>,
+    /// Energy that the contact's friction has dissipated before, J; only a contact that wears
+    /// depends on it.
+    pub worn_j: f64,
 }
 
 /// Reason why a board could not start or has stopped.
@@ -86,7 +89,7 @@ impl VirtualBoard {
     /// # Errors
     /// [`BoardError`].
     pub fn start_with(config: &RigConfig, options: &Options) -> Result<(Self, HostEnd), BoardError> {
-        let rig = Rig::new(config, options.seed)?;
+        let rig = Rig::new(config, options.seed)?.after_wear(options.worn_j)?;
         let (host, device) = pair();
         let controls = Arc::new(Controls::default());
         let thread = std::thread::Builder::new().name("virtual board".into()).spawn({

@@ -11,8 +11,9 @@
 //! configuration, cell, attempt, purpose) and counted from the last [`Rig::stage`] or
 //! [`Rig::fire`]: never to absolute time, never to what happened in other cells. [`Rig::stage`]
 //! puts the structure at rest. Within a cell the decay of an earlier hit is physical and does
-//! depend on the scans that have passed since. The only exception is a contact that drifts: it also
-//! depends on the hits and scans since the rig was started.
+//! depend on the scans that have passed since. The only exceptions are a contact that drifts, which
+//! also depends on the hits and scans since the rig was started, and one that wears, which depends
+//! on the energy that its friction has dissipated ([`Rig::worn_j`]).
 //!
 //! **Cost.** A scan of the assembly at 51.2 kHz takes about 0.1 µs; `benches/rig.rs` measures it.
 //! Bodies that bend triple the number of modes. No mode is dropped: the static flexibility of a
@@ -95,8 +96,14 @@ pub struct Rig {
     total_scans: u64,
     /// Hits since then, also only for such a contact.
     total_hits: u64,
-    /// The rig with its contact as it was when the cell was staged, if it drifts.
-    drifted: Option<Box<RigConfig>>,
+    /// The rig with its contact as it is now, if it drifts or wears.
+    changed: Option<Box<RigConfig>>,
+    /// Hits and scans up to which the contact had drifted when the cell was staged.
+    drifted_to: (u64, u64),
+    /// Energy that the contact's friction had dissipated when the cell was staged (J).
+    worn_before_j: f64,
+    /// The same energy up to which the contact stays as it is now (J).
+    steady_until_j: f64,
 }
 
 impl Rig {
@@ -162,13 +169,36 @@ impl Rig {
             last_hit: None,
             total_scans: 0,
             total_hits: 0,
-            drifted: None,
+            changed: None,
+            drifted_to: (0, 0),
+            worn_before_j: 0.0,
+            steady_until_j: f64::INFINITY,
             stepping,
             config: config.clone(),
         };
         let (impact, response) = (rig.impact.clone(), rig.response.clone());
+        if config.contact.wear.is_some() {
+            // the fully worn contact must be possible too
+            let worn = rig.config_after((0, 0), f64::INFINITY);
+            let plant = Plant::new(&worn, configuration, stepping, period_s)?;
+            plant.aimed(&worn, &rig.flaws, &rig.aim, &rig.channels)?;
+        }
         rig.stage(configuration, &impact, &response, 0)?;
         Ok(rig)
+    }
+
+    /// The same rig after its contact's friction has dissipated the energy `worn_j` (J), at rest in
+    /// the cell that is staged. Only a contact that wears depends on it.
+    ///
+    /// # Errors
+    /// [`RigError::Field`] for an energy that is negative or not a number.
+    pub fn after_wear(mut self, worn_j: f64) -> Result<Self, RigError> {
+        config::worn(worn_j)?;
+        self.slipping = None;
+        self.worn_before_j = worn_j;
+        let (impact, response) = (self.impact.clone(), self.response.clone());
+        self.stage(self.configuration, &impact, &response, self.attempt)?;
+        Ok(self)
     }
 
     /// Scans per second (Hz).
@@ -227,12 +257,13 @@ impl Rig {
             && (on_known_mass || mark.is_some_and(|mark| mark.name == response));
         let aim = Aim::new(self.seed, words, &self.config.errors, hit, seen, at_mark);
         let speckle = seen.speckle;
-        let drifted = (configuration == Configuration::Ajb && self.config.contact.drifts()).then(|| {
-            let contact = self.config.contact.drifted(self.total_hits, self.time_s(self.total_scans));
-            Box::new(RigConfig { contact, ..self.config.clone() })
-        });
-        let config = drifted.as_deref().unwrap_or(&self.config);
-        let fresh = match &drifted {
+        let worn_j = self.worn_j();
+        let drifted_to = (self.total_hits, self.total_scans);
+        let changes = self.config.contact.drifts() || self.config.contact.wear.is_some();
+        let changed = (configuration == Configuration::Ajb && changes)
+            .then(|| Box::new(self.config_after(drifted_to, worn_j)));
+        let config = changed.as_deref().unwrap_or(&self.config);
+        let fresh = match &changed {
             Some(config) => Some(Plant::new(config, configuration, self.stepping, self.period_s)?),
             None => None,
         };
@@ -243,7 +274,10 @@ impl Rig {
         if let Some(fresh) = fresh {
             self.plants[configuration as usize] = fresh;
         }
-        self.drifted = drifted;
+        self.changed = changed;
+        self.drifted_to = drifted_to;
+        self.worn_before_j = worn_j;
+        self.steady_until_j = self.steady_until(worn_j);
         self.aim = aim;
         self.stepper = stepper;
         self.slipping = slipping;
@@ -368,6 +402,9 @@ impl Rig {
             None => self.stepper.advance(Span::Scan, &forces),
             Some(slipping) => slipping.advance(&mut self.stepper, &forces),
         }
+        if self.steady_until_j < f64::INFINITY && self.worn_j() > self.steady_until_j {
+            self.wear();
+        }
         self.truth[FORCE] = self.sensors.hammer_n(&self.pending, from_s, to_s);
         self.truth[FIRST_SIGNAL..EXCITATION].copy_from_slice(&self.stepper.signals());
         self.truth[EXCITATION] = shaker_n;
@@ -396,9 +433,45 @@ impl Rig {
         }
     }
 
-    /// The rig with the contact of this cell.
+    /// The rig with its contact as it is now.
     fn current(&self) -> &RigConfig {
-        self.drifted.as_deref().unwrap_or(&self.config)
+        self.changed.as_deref().unwrap_or(&self.config)
+    }
+
+    /// The rig after its contact has drifted for these hits and scans, and dissipated this energy.
+    fn config_after(&self, (hits, scans): (u64, u64), worn_j: f64) -> RigConfig {
+        let contact = self.config.contact.drifted(hits, self.time_s(scans)).worn(worn_j);
+        RigConfig { contact, ..self.config.clone() }
+    }
+
+    fn steady_until(&self, worn_j: f64) -> f64 {
+        self.config.contact.wear.map_or(f64::INFINITY, |wear| wear.steady_until_j(worn_j))
+    }
+
+    /// Applies the law of wear in the middle of the motion.
+    ///
+    /// # Panics
+    /// Never: [`Rig::with_stepping`] has built the unworn and the fully worn contact, and all
+    /// others lie between them.
+    fn wear(&mut self) {
+        let worn_j = self.worn_j();
+        self.steady_until_j = self.steady_until(worn_j);
+        // only the assembly has a contact
+        let place = Configuration::Ajb as usize;
+        let config = self.config_after(self.drifted_to, worn_j);
+        let plant = Plant::new(&config, Configuration::Ajb, self.stepping, self.period_s)
+            .expect("lies between two contacts that were built");
+        let (mut stepper, mut slipping) = plant
+            .aimed(&config, &self.flaws, &self.aim, &self.channels)
+            .expect("lies between two contacts that were built");
+        stepper.set_state(&plant.state_of(&self.plants[place], &self.stepper));
+        if let (Some(now), Some(before)) = (&mut slipping, &self.slipping) {
+            now.continues(before);
+        }
+        self.direct = plant.direct(&config, &self.flaws, &self.aim);
+        self.plants[place] = plant;
+        (self.stepper, self.slipping) = (stepper, slipping);
+        self.changed = Some(Box::new(config));
     }
 
     fn time_s(&self, scans: u64) -> f64 {
@@ -446,6 +519,12 @@ impl Rig {
     fn plant(&self) -> &Plant {
         let known_mass = self.known_mass.as_ref().filter(|_| self.aim.impact.body == BodyName::KnownMass);
         known_mass.unwrap_or(&self.plants[self.configuration as usize])
+    }
+
+    /// Energy that the contact's friction has dissipated in the rig's life (J): what a contact that
+    /// wears depends on.
+    pub fn worn_j(&self) -> f64 {
+        self.worn_before_j + self.slipping.as_ref().map_or(0.0, |slipping| slipping.sliders().friction_j())
     }
 
     /// Current mechanical energy of the structure (J).

@@ -272,6 +272,22 @@ impl StateSpace {
         self.velocity(pushed)
     }
 
+    /// Displacements and velocities (n each) of the structure's coordinates in the state `x` (2n).
+    pub fn motion(&self, x: &DVector<f64>) -> [DVector<f64>; 2] {
+        let n = self.scale.len();
+        let displacements = DVector::from_fn(n, |i, _| x[i] / self.scale[i]);
+        [&self.shapes * displacements, &self.shapes * x.rows(n, n)]
+    }
+
+    /// The state (2n) with these displacements and velocities (n each) of a structure with this
+    /// mass matrix.
+    pub fn state(&self, mass: &DMatrix<f64>, [at, moving]: &[DVector<f64>; 2]) -> DVector<f64> {
+        let n = self.scale.len();
+        // the shapes are normalised to unit modal mass
+        let [at, moving] = [at, moving].map(|own| self.shapes.tr_mul(&(mass * own)));
+        DVector::from_fn(2 * n, |i, _| if i < n { at[i] * self.scale[i] } else { moving[i - n] })
+    }
+
     /// Mechanical energy (J) of the state `x` (2n).
     pub fn energy_j(&self, x: &DVector<f64>) -> f64 {
         let n = self.scale.len();

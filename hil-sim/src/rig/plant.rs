@@ -180,6 +180,11 @@ impl Plant {
         Ok((stepper, Some(slipping)))
     }
 
+    /// The state of another plant of the same bodies in this one's coordinates.
+    pub(super) fn state_of(&self, other: &Self, stepper: &Stepper) -> DVector<f64> {
+        self.space.state(&self.structure.mass, &other.space.motion(&stepper.state()))
+    }
+
     /// What the fixed sensors read directly of the forces of the same moment.
     pub(super) fn direct(&self, config: &RigConfig, flaws: &Flaws, aim: &Aim) -> Vec<Direct> {
         let nothing = || DVector::zeros(self.space.order());

@@ -110,6 +110,19 @@ impl Sliders {
         self.settled &= self.holds.0 <= self.y && self.y <= self.holds.1;
     }
 
+    /// Takes over the positions of as many elements of another stiffness or limit, and the totals.
+    pub fn continues(&mut self, before: &Self) {
+        self.slip.clone_from(&before.slip);
+        self.lead.clone_from(&before.lead);
+        self.stuck.clone_from(&before.stuck);
+        (self.leads, self.y) = (before.leads, before.y);
+        (self.friction_j, self.slid_m) = (before.friction_j, before.slid_m);
+        self.settled = before.settled;
+        self.bound();
+        // the new limit may be below the force that is carried now
+        self.settled &= self.holds.0 <= self.y && self.y <= self.holds.1;
+    }
+
     /// Determines the range in which no element slips.
     fn bound(&mut self) {
         self.holds = (f64::NEG_INFINITY, f64::INFINITY);

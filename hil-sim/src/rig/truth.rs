@@ -14,8 +14,8 @@ const SMALLEST_OF_LARGEST: f64 = 1e-14;
 /// Both virtual points (m): the rig's origin.
 const VIRTUAL_POINT_M: [f64; 3] = [0.0; 3];
 
-/// The stiffnesses along z that follow from a rig's parameters; of a contact that drifts, at the
-/// start. Paths beside the contact are not part of them.
+/// The stiffnesses along z that follow from a rig's parameters; of a contact that drifts or
+/// wears, at the start. Paths beside the contact are not part of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
@@ -56,6 +56,12 @@ impl RigConfig {
         let soft = [&self.clamp, &self.clamp_b].into_iter().filter(|clamp| !clamp.rigid);
         let clamps = soft.map(|clamp| self.compliance(&clamp.loaded, None)).reduce(|a, b| a + b);
         self.found(clamps.unwrap_or(0.0) + contact, clamps)
+    }
+
+    /// The same after the contact's friction has dissipated the energy `worn_j` (J), for a contact
+    /// that wears.
+    pub fn truth_after(&self, worn_j: f64) -> Truth {
+        Self { contact: self.contact.worn(worn_j), ..self.clone() }.truth()
     }
 
     /// Compliance along the sliding direction between the arms, at the virtual points: of all

@@ -24,3 +24,4 @@ mod stepping;
 mod supplies;
 mod support;
 mod sync;
+mod wear;

@@ -13,6 +13,8 @@ const BY_HAND: &str = include_str!("../../rigs/by-hand.toml");
 /// A rig with accelerometers instead of lasers.
 const ACCELEROMETERS: &str = include_str!("../../rigs/accelerometers.toml");
 
+/// A rig whose contact wears.
+const WEARING: &str = include_str!("../../rigs/wearing.toml");
 /// A rig whose bodies bend.
 const ELASTIC: &str = include_str!("../../rigs/elastic.toml");
 
@@ -61,6 +63,7 @@ fn the_page_and_the_rig_have_the_same_fields() {
     fields("", &toml::from_str(BY_HAND).unwrap(), &mut known);
     fields("", &toml::from_str(ACCELEROMETERS).unwrap(), &mut known);
     fields("", &toml::from_str(ELASTIC).unwrap(), &mut known);
+    fields("", &toml::from_str(WEARING).unwrap(), &mut known);
     // fields that the examples omit: every spring is in all configurations, there is no load cell,
     // the converters have 16 bits, sections are aligned with the rig, own bodies are rigid, and
     // nothing is off except what is drawn

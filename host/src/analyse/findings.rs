@@ -13,6 +13,7 @@ use super::shaker_levels::RecordLoops;
 use crate::contact::{ContactError, Stiffness};
 use crate::results::{
     Bootstrap, Cells, Completeness, FirstMode, FrfCurve, HitRow, NoiseFloor, Place, Source, UsableBand,
+    WearRuns,
 };
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -65,6 +66,8 @@ pub struct Findings {
     pub first_mode: Option<FirstMode>,
     /// The loops of a single record.
     pub record: Option<RecordLoops>,
+    /// The wear runs of a campaign.
+    pub wear: Option<WearRuns>,
     /// Missing data, in the order in which they were noticed.
     pub missing: Vec<Missing>,
 }

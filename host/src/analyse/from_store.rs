@@ -11,8 +11,10 @@ use super::cell::{
 };
 use super::chosen::DataQuality;
 use super::findings::Findings;
+use super::missing::Missing;
 use super::modal::{FoundModes, NoModes};
 use super::plan_geometry::{geometry, places};
+use super::wear::wear;
 use crate::campaign::plan::{KNOWN_MASS_SIGMA, Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
@@ -216,7 +218,13 @@ pub fn analyse(
     let (source, completeness) = (file.source(store)?, file.completeness());
     let found = analyse_measurements(&file, wanted, progress);
     let cells = Some(file.cell_rows(&found.data_quality));
-    Ok(Findings { source, completeness, cells, geometry: places(&file.plan), hits: file.hit_rows(), ..found })
+    let (geometry, hits) = (places(&file.plan), file.hit_rows());
+    let mut found = Findings { source, completeness, geometry, cells, hits, ..found };
+    match wear(store) {
+        Ok(wear) => found.wear = wear,
+        Err(error) => found.missing.push(Missing::Wear(error.to_string())),
+    }
+    Ok(found)
 }
 
 pub(super) struct PlannedCell {

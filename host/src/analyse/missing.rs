@@ -126,6 +126,8 @@ pub enum Missing {
         /// The reason.
         error: HysteresisError,
     },
+    /// The cycles of the wear runs cannot be read.
+    Wear(String),
     /// The static arm's effective mass is not known, so there is no corrected force.
     EffectiveMass,
 }

@@ -38,6 +38,7 @@ mod rig_tests;
 mod shaker_levels;
 #[cfg(test)]
 mod shaker_levels_tests;
+pub mod wear;
 
 pub use averages::LINES_HZ;
 pub use campaign::analyse_measurements;

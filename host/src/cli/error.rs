@@ -12,6 +12,7 @@ use crate::campaign::import::ImportError;
 use crate::campaign::plan::PlanError;
 use crate::campaign::run::error::RunError;
 use crate::campaign::run::shaking::ShakeError;
+use crate::campaign::run::shaking::wear::WearError;
 use crate::campaign::store::error::StoreError;
 use crate::device::error::DeviceError;
 
@@ -36,6 +37,9 @@ pub enum CliError {
     /// The shaker's levels.
     #[error(transparent)]
     Shake(#[from] ShakeError),
+    /// A wear run.
+    #[error(transparent)]
+    Wear(#[from] WearError),
     /// The analysis.
     #[error(transparent)]
     Analyse(#[from] AnalyseError),

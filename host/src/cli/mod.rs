@@ -41,6 +41,7 @@ mod self_test;
 mod serve;
 mod shaker;
 mod trend;
+mod wear;
 
 /// Stiffness of a friction joint, measured: impact campaigns, FRFs, substructuring, hysteresis.
 #[derive(Debug, Parser)]
@@ -67,6 +68,8 @@ enum Command {
     Plan(plan::Plan),
     /// Measure levels of the shaker into a campaign file.
     Shaker(shaker::Shaker),
+    /// Wear a contact with the shaker, and measure every cycle into a campaign file.
+    Wear(wear::Wear),
     /// Analyse a campaign file: results.json and report.html.
     Analyse(analyse::Analyse),
     /// Write the report of a campaign file, and its figures as files.
@@ -129,6 +132,7 @@ impl Cli {
             Command::Campaign(command) => command.run(),
             Command::Plan(command) => command.run(),
             Command::Shaker(command) => command.run(),
+            Command::Wear(command) => command.run(),
             Command::Analyse(command) => command.run(),
             Command::Report(command) => command.run(),
             #[cfg(feature = "dashboard")]

@@ -104,12 +104,13 @@ impl Shaker {
             None if store.records()?.is_empty() => Moment::Before,
             None => Moment::After,
         };
-        let mut session = Session::open(address.open(self.seed)?, &address.to_string())?;
+        let mut session =
+            Session::open(address.open_worn(self.seed, store.wear_total()?.energy_j)?, &address.to_string())?;
         session.look_for_log_tables(Tables::new(self.log_tables.clone()));
         onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
         let info = session.info()?;
         if info.drive_v > 0.0 && !info.stage {
-            prompt(self.yes, levels.len())?;
+            ready(self.yes, &format!("{} levels of the shaker", levels.len()))?;
         }
         output::catch(&stop, "shot");
         tell_line!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
@@ -288,9 +289,9 @@ fn look(store: &Store, row: &LevelRow) -> Option<Result<LoopAnalysis, String>> {
 }
 
 /// Asks the person at the rig for confirmation before anything moves.
-fn prompt(yes: bool, levels: usize) -> Result<(), CliError> {
+pub(super) fn ready(yes: bool, what: &str) -> Result<(), CliError> {
     tell(&format!(
-        "\n{levels} levels of the shaker. Check that the assembly is on the table under its normal load, the stinger is attached, the \
+        "\n{what}. Check that the assembly is on the table under its normal load, the stinger is attached, the \
          amplifier is on and nobody touches the rig.\n"
     ));
     if yes {
@@ -315,7 +316,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     if ends[0] == ends[1] { Err(wrong.into()) } else { Ok(ends) }
 }
 
-fn limit(text: &str) -> Result<(String, f64), String> {
+pub(super) fn limit(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write CHANNEL=VALUE")?;
     Ok((name.to_owned(), positive(value)?))
 }

@@ -117,8 +117,18 @@ impl Address {
     /// # Errors
     /// [`DeviceError::Open`] with the cause and what to do.
     pub fn open(&self, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+        self.open_worn(seed, 0.0)
+    }
+
+    /// As [`Address::open`], for a contact whose friction has dissipated the energy `worn_j` (J) in
+    /// the wear runs of a campaign. Only a simulated rig in this process that wears depends on it;
+    /// every other rig has its contact's history in itself.
+    ///
+    /// # Errors
+    /// As [`Address::open`].
+    pub fn open_worn(&self, seed: u64, worn_j: f64) -> Result<Box<dyn Transport>, DeviceError> {
         match self {
-            Self::Sim { rig } => open_sim(rig.as_deref(), seed),
+            Self::Sim { rig } => open_sim(rig.as_deref(), seed, worn_j),
             Self::Serial(path) => Ok(Box::new(super::serial::Serial::open(path)?)),
             Self::Usb { serial } => Ok(Box::new(super::usb::Usb::open(serial.as_deref())?)),
             Self::Tcp(place) => Ok(Box::new(Tcp::open(place)?)),
@@ -144,8 +154,12 @@ fn open_bridge(source: &BridgeSource) -> Result<Box<dyn Transport>, DeviceError>
 }
 
 #[cfg(feature = "sim")]
-fn open_sim(rig: Option<&std::path::Path>, seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
-    Ok(Box::new(Sim::open(rig, seed)?))
+fn open_sim(
+    rig: Option<&std::path::Path>,
+    seed: u64,
+    worn_j: f64,
+) -> Result<Box<dyn Transport>, DeviceError> {
+    Ok(Box::new(Sim::open(rig, seed, worn_j)?))
 }
 
 #[cfg(all(feature = "sim", unix))]
@@ -172,7 +186,11 @@ fn open_qemu(image: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Tran
 }
 
 #[cfg(not(feature = "sim"))]
-fn open_sim(rig: Option<&std::path::Path>, _seed: u64) -> Result<Box<dyn Transport>, DeviceError> {
+fn open_sim(
+    rig: Option<&std::path::Path>,
+    _seed: u64,
+    _worn_j: f64,
+) -> Result<Box<dyn Transport>, DeviceError> {
     Err(DeviceError::NotBuilt {
         given: Address::Sim { rig: rig.map(Into::into) }.to_string(),
         scheme: "sim".into(),

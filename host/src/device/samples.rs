@@ -4,6 +4,8 @@
 //! file and out of it. The type belongs to the record, the sensor's scale to the session's channel
 //! map; the factor from a sample to SI units follows from both ([`SampleType::units`]).
 
+use std::ops::Range;
+
 use jointrig_protocol::channel::Channel;
 
 /// The type of a channel's samples.
@@ -224,6 +226,16 @@ impl<'a> ChannelView<'a> {
         }
     }
 
+    /// A copy of the samples.
+    pub fn to_owned(self) -> ChannelSamples {
+        match self {
+            Self::I16(samples) => ChannelSamples::I16(samples.to_vec()),
+            Self::I32(samples) => ChannelSamples::I32(samples.to_vec()),
+            Self::F32(samples) => ChannelSamples::F32(samples.to_vec()),
+            Self::F64(samples) => ChannelSamples::F64(samples.to_vec()),
+        }
+    }
+
     /// Appends the samples times `factor` to `out`.
     pub fn scaled(self, factor: f64, out: &mut Vec<f64>) {
         fn of<T: Copy + Into<f64>>(samples: &[T], factor: f64, out: &mut Vec<f64>) {
@@ -290,6 +302,12 @@ impl Samples {
     /// Samples per channel.
     pub fn scans(&self) -> usize {
         self.channels.first().map_or(0, |channel| channel.view().len())
+    }
+
+    /// A copy of these scans of every channel, as far as they exist.
+    #[must_use]
+    pub fn part(&self, scans: Range<usize>) -> Self {
+        Self { channels: self.each().map(|own| own.part(scans.start, scans.end).to_owned()).collect() }
     }
 
     /// The type of each channel.

@@ -26,11 +26,12 @@ pub struct Sim {
 }
 
 impl Sim {
-    /// Starts the rig described in the file, or the built-in one.
+    /// Starts the rig described in the file, or the built-in one, after its contact's friction has
+    /// dissipated the energy `worn_j` (J).
     ///
     /// # Errors
     /// [`DeviceError::Open`] with the error in the description, and where.
-    pub fn open(rig: Option<&Path>, seed: u64) -> Result<Self, DeviceError> {
+    pub fn open(rig: Option<&Path>, seed: u64, worn_j: f64) -> Result<Self, DeviceError> {
         let address = || rig.map_or_else(|| "sim:".into(), |path| format!("sim:{}", path.display()));
         let open = |why: String| DeviceError::Open { address: address(), why };
         let text = match rig {
@@ -46,10 +47,11 @@ impl Sim {
             None => None,
         };
         let config = RigConfig::of_device(text.as_deref()).map_err(|error| open(error.to_string()))?;
-        let options = Options { seed, ..Options::default() };
+        let options = Options { seed, worn_j, ..Options::default() };
         let (board, link) =
             VirtualBoard::start_with(&config, &options).map_err(|error| open(error.to_string()))?;
-        let truth = serde_json::to_value(config.truth()).map_err(|error| open(error.to_string()))?;
+        let truth =
+            serde_json::to_value(config.truth_after(worn_j)).map_err(|error| open(error.to_string()))?;
         let parameters = BASE64_STANDARD.encode(Sha256::digest(config.to_toml().as_bytes()));
         let simulated = Simulated { rig: config.name, seed, parameters, truth };
         Ok(Self { link, simulated, _board: board })

@@ -7,7 +7,7 @@
 //!
 //! Here: the answer, the checks, the comparison of two campaigns and the provenance. `joint`: the
 //! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured; `modal`:
-//! the modes.
+//! the modes; `wear`: the wear runs.
 
 use crate::campaign::store::SimulatedTruth;
 use crate::contact::{Contradiction, Diagnosis, Doubt, Interval, OfFrequency};
@@ -29,6 +29,7 @@ pub use measured::{CellRow, Cells, FrfCurve, HitRow, NoiseFloor, Place, Role, Us
 pub use modal::{
     ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, PoleOnly, SensorPlace, SessionFrequency,
 };
+pub use wear::{WearDecade, WearRuns};
 
 #[cfg(test)]
 pub(crate) mod example_tests;
@@ -36,6 +37,7 @@ mod joint;
 mod loops;
 mod measured;
 mod modal;
+mod wear;
 
 /// Version of the format: 1.
 pub const VERSION: u32 = 1;
@@ -83,6 +85,9 @@ pub struct Results {
     pub first_mode: Option<FirstMode>,
     /// The contact by loops.
     pub hysteresis: Vec<Hysteresis>,
+    /// The wear runs of a campaign, by decades of cycles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wear: Option<WearRuns>,
     /// Whether the numbers are credible.
     pub checks: Vec<Check>,
     /// Every type of stiffness that was found along the sliding direction, with its meaning.

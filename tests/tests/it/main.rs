@@ -47,5 +47,6 @@ mod sync;
 mod trend;
 mod troubleshooting;
 mod tutorial;
+mod wear;
 mod wide_channels;
 mod wrong_files;

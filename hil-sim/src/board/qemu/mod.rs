@@ -90,7 +90,7 @@ impl QemuBoard {
         config: &RigConfig,
         options: &Options,
     ) -> Result<(Self, HostEnd), QemuError> {
-        let rig = Rig::new(config, options.seed)?;
+        let rig = Rig::new(config, options.seed)?.after_wear(options.worn_j)?;
         if config.sensors.bits != 16 {
             return Err(QemuError::Bits(config.sensors.bits));
         }

@@ -32,6 +32,10 @@ const THICKEST_BEAM: f64 = 100.0;
 /// rigid.
 const SOFTEST_PA: f64 = 1e8;
 const STIFFEST_PA: f64 = 1e15;
+/// Bounds of the relative change of stiffness or friction coefficient by wear.
+const LEAST_WEAR: f64 = -0.9;
+const MOST_WEAR: f64 = 10.0;
+
 /// Maximum number of elements of a beam.
 const MOST_BEAM_ELEMENTS: u32 = 20;
 /// Maximum number of elements of an Iwan contact: more would only cost time.
@@ -169,8 +173,11 @@ fn errors(config: &RigConfig) -> Result<(), RigError> {
         // could never stick again.
         let shares = contact.shares();
         let largest = shares.iter().copied().fold(0.0, f64::max) * shares.len() as f64;
-        let reach_m =
-            contact.friction_coefficient * contact.normal_load_n * largest / contact.stiffness_n_per_m[2];
+        let [stiffness, friction] = contact.wear.map_or([1.0; 2], |wear| {
+            [1.0 + wear.stiffness_change.min(0.0), 1.0 + wear.friction_change.max(0.0)]
+        });
+        let reach_m = contact.friction_coefficient * friction * contact.normal_load_n * largest
+            / (contact.stiffness_n_per_m[2] * stiffness);
         if errors.normal_load_slope_per_m().abs() * reach_m >= 1.0 {
             return Err(bad(
                 "errors.normal_load_variation",
@@ -241,6 +248,29 @@ fn contact(config: &RigConfig) -> Result<(), RigError> {
             ));
         }
     }
+    if let Some(wear) = &contact.wear {
+        if contact.law == ContactLaw::Linear {
+            return Err(bad(
+                "contact.wear",
+                "needs a contact that can slip: with the linear law nothing is dissipated by friction",
+            ));
+        }
+        positive("contact.wear.stiffness_energy_j", wear.stiffness_energy_j)?;
+        positive("contact.wear.friction_energy_j", wear.friction_energy_j)?;
+        for (field, change) in [
+            ("contact.wear.stiffness_change", wear.stiffness_change),
+            ("contact.wear.friction_change", wear.friction_change),
+        ] {
+            if !(LEAST_WEAR..=MOST_WEAR).contains(&change) {
+                return Err(bad(
+                    field,
+                    &format!(
+                        "is {change}: it must be {LEAST_WEAR} to {MOST_WEAR}, the change relative to the unworn contact"
+                    ),
+                ));
+            }
+        }
+    }
     if contact.law != ContactLaw::Linear && contact.stiffness_n_per_m[2] <= 0.0 {
         return Err(bad(
             "contact.stiffness_n_per_m",
@@ -248,6 +278,11 @@ fn contact(config: &RigConfig) -> Result<(), RigError> {
         ));
     }
     Ok(())
+}
+
+/// Checks the energy (J) that a contact's friction has dissipated.
+pub fn worn(worn_j: f64) -> Result<(), RigError> {
+    not_negative("contact.worn_j", worn_j)
 }
 
 /// Checks a normal load (N).

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use super::configuration::{BodyName, OwnName};
-pub(crate) use check::normal_load;
+pub(crate) use check::{normal_load, worn};
 pub use own_structure::{OwnBody, OwnStructure, Side, Spring};
 
 mod check;
@@ -527,6 +527,53 @@ pub struct Contact {
     /// The same for each second of scans (1/s).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub drift_per_s: f64,
+    /// How the energy dissipated by its friction changes it; a contact that does not wear has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wear: Option<Wear>,
+}
+
+/// How a contact changes with the energy E that its friction has dissipated: kz grows by the factor
+/// 1 + a (1 − exp(−E/E₁)), and so does μ with a and E₁ of its own. The law is applied in steps in
+/// which neither changes by more than a thousandth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wear {
+    /// a of kz; negative if it falls.
+    pub stiffness_change: f64,
+    /// E₁ of kz (J).
+    pub stiffness_energy_j: f64,
+    /// a of μ; negative if it falls.
+    pub friction_change: f64,
+    /// E₁ of μ (J).
+    pub friction_energy_j: f64,
+}
+
+/// Relative change of stiffness or friction coefficient in one step of the law.
+const WEAR_STEP: f64 = 1e-3;
+
+impl Wear {
+    /// The factors of kz and μ after the energy `worn_j` (J).
+    pub fn factors(&self, worn_j: f64) -> [f64; 2] {
+        self.parts().map(|(change, energy_j)| 1.0 - change * (-worn_j / energy_j).exp_m1())
+    }
+
+    /// The energy (J) up to which the contact stays as it is at `worn_j`.
+    pub fn steady_until_j(&self, worn_j: f64) -> f64 {
+        // the relative slopes of both factors fall with the energy, so a step is never too long
+        let slope = self
+            .parts()
+            .into_iter()
+            .zip(self.factors(worn_j))
+            .map(|((change, energy_j), factor)| {
+                (change / energy_j * (-worn_j / energy_j).exp() / factor).abs()
+            })
+            .fold(0.0, f64::max);
+        worn_j + WEAR_STEP / slope
+    }
+
+    fn parts(&self) -> [(f64, f64); 2] {
+        [(self.stiffness_change, self.stiffness_energy_j), (self.friction_change, self.friction_energy_j)]
+    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
@@ -559,6 +606,17 @@ impl Contact {
             rotation_nm_per_rad: self.rotation_nm_per_rad.map(|k| k * factor),
             ..self.clone()
         }
+    }
+
+    /// The contact after its friction has dissipated this energy (J).
+    #[must_use]
+    pub fn worn(&self, worn_j: f64) -> Self {
+        let Some(wear) = self.wear else { return self.clone() };
+        let mut worn = self.clone();
+        let [stiffness, friction] = wear.factors(worn_j);
+        worn.stiffness_n_per_m[2] *= stiffness;
+        worn.friction_coefficient *= friction;
+        worn
     }
 
     /// Each slider's fraction of μN, the weakest first; empty for the linear law. They share the

@@ -147,6 +147,11 @@ impl ExponentialStepper {
         self.x.clone()
     }
 
+    /// As [`super::Stepper::set_state`].
+    pub fn set_state(&mut self, x: &DVector<f64>) {
+        self.x.copy_from(x);
+    }
+
     fn whole_scan(&mut self, omega: f64) -> &DMatrix<f64> {
         let key = omega.to_bits();
         let at = self.whole_scans.iter().position(|(known, _)| *known == key).unwrap_or_else(|| {

@@ -146,6 +146,11 @@ impl Stepper {
     pub fn state(&self) -> DVector<f64> {
         either!(self, stepper => stepper.state())
     }
+
+    /// Sets the state x (2n).
+    pub fn set_state(&mut self, x: &DVector<f64>) {
+        either!(self, stepper => stepper.set_state(x));
+    }
 }
 
 /// The step's equation converges from any start while its slopes differ by less than a half.
@@ -181,6 +186,11 @@ impl Slipping {
     /// Sets the normal load (N).
     pub fn load(&mut self, normal_load_n: f64) {
         self.sliders.load(normal_load_n);
+    }
+
+    /// Takes over where the elements of `before` are, in a joint that has changed since.
+    pub fn continues(&mut self, before: &Self) {
+        self.sliders.continues(&before.sliders);
     }
 
     /// Advances one scan period.

@@ -277,6 +277,12 @@ impl ModalStepper {
         }
         x
     }
+
+    /// As [`super::Stepper::set_state`].
+    pub fn set_state(&mut self, x: &DVector<f64>) {
+        self.z = self.modes.iter().map(|mode| project(mode, x)).collect();
+        self.active = self.modes.len();
+    }
 }
 
 fn read_parts(row: &Parts, z: &Parts, count: usize) -> f64 {

@@ -38,7 +38,9 @@ pub(super) struct Steady<'a> {
     record: &'a HysteresisRecord,
     timing: Timing,
     points: usize,
-    /// Indices of the cycles used, counted from the beginning of the record.
+    /// Where cycle 0 begins, in cycles after the first sample.
+    begin: f64,
+    /// Indices of the cycles used, counted from there.
     used: Range<usize>,
 }
 
@@ -158,7 +160,32 @@ impl<'a> Steady<'a> {
         if cycles == 0 || points < FEWEST_SAMPLES {
             return Err(HysteresisError::NoCycle { frequency_hz, samples, points });
         }
-        Ok(Self { record, timing, points, used: 0..cycles })
+        Ok(Self { record, timing, points, begin: 0.0, used: 0..cycles })
+    }
+
+    /// The cycles from `begin` cycles after the first sample onwards.
+    ///
+    /// # Errors
+    /// As [`Steady::new`].
+    pub fn from_cycle(
+        record: &'a HysteresisRecord,
+        timing: Timing,
+        begin: f64,
+        cycles: usize,
+    ) -> Result<Self, HysteresisError> {
+        let all = Self::new(record, timing)?;
+        Ok(Self { begin, used: 0..cycles, ..all })
+    }
+
+    /// Calls `look` for every cycle as measured, one after another; drift is not removed.
+    pub fn each_as_measured(&self, mut look: impl FnMut(&Cycle)) {
+        let mut scratch = Scratch::default();
+        for cycle in self.used.clone() {
+            let place = self.place(cycle);
+            self.cut_motion(&place, &[], &mut scratch);
+            self.cut_force(&place, None, &[], &mut scratch);
+            look(&scratch.cycle);
+        }
     }
 
     /// Number of cycles used.
@@ -325,7 +352,7 @@ impl<'a> Steady<'a> {
 
     /// Location of cycle number `cycle`.
     fn place(&self, cycle: usize) -> CycleSpan {
-        let [begin_s, end_s] = [0.0, 1.0].map(|more| self.timing.begin_s(cycle as f64 + more));
+        let [begin_s, end_s] = [0.0, 1.0].map(|more| self.timing.begin_s(self.begin + cycle as f64 + more));
         let (begin, period) = (begin_s * self.record.fs_hz, (end_s - begin_s) * self.record.fs_hz);
         // cubic interpolation needs one sample before and two after
         let first = begin.floor() as isize - 1;

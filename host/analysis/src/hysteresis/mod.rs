@@ -13,7 +13,8 @@
 //! given: the load cells' sum is not T at the contact (the static arm's inertia adds 2.4 % at 250
 //! Hz). [`static_arm`] identifies the arm's parameters and converts it to the contact's force, and
 //! the corrected record is analysed in addition to the raw one. [`compliance`] treats the same
-//! signals in the frequency domain, [`backbone`] several levels.
+//! signals in the frequency domain, [`backbone`] several levels, [`wear`] every cycle of a run of
+//! millions by itself.
 
 use impact::DecayCycle;
 use num_complex::Complex;
@@ -35,6 +36,7 @@ pub mod shape;
 pub mod static_arm;
 mod steady;
 mod stick;
+pub mod wear;
 
 pub use analyse::{analyse, analyse_both, analyse_corrected};
 pub use loops::OverCycles;

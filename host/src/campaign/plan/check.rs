@@ -13,6 +13,9 @@ use toml::Spanned;
 /// Largest plausible amplitude at the contact, m: catches a plan written in µm.
 const LARGEST_AMPLITUDE_M: f64 = 1e-3;
 
+/// Most cycles of the wear runs of a file: 210 MB.
+const MOST_WEAR_CYCLES: u64 = 10_000_000;
+
 impl Plan {
     pub(super) fn check(&self, faults: &mut Faults) {
         let mut require = |good: bool, at: usize, what: &str| faults.unless(good, at, what);
@@ -78,6 +81,7 @@ impl Plan {
         self.check_structure(faults);
         self.check_limits(faults);
         self.check_shaker(faults);
+        self.check_wear(faults);
         self.check_contact(faults);
         self.check_specimens(faults);
         self.check_priors(faults);
@@ -139,6 +143,42 @@ impl Plan {
             at,
             format!("shaker.amplitudes_m must be over 0 and at most {LARGEST_AMPLITUDE_M}, one or more"),
         );
+    }
+
+    fn check_wear(&self, faults: &mut Faults) {
+        let Some(wear) = &self.wear else { return };
+        let (run, at) = (wear.get_ref(), wear.span().start);
+        let highest = f64::from(self.record.get_ref().rate_hz) / f64::from(SHAKE_SCANS_PER_CYCLE);
+        let over_zero = |value: Option<f64>| value.is_none_or(|value| value > 0.0 && value.is_finite());
+        for (good, what) in [
+            (
+                run.frequency_hz > 0.0 && run.frequency_hz <= highest,
+                format!("wear.frequency_hz must be over 0 and at most {highest}"),
+            ),
+            (
+                run.amplitude_m > 0.0 && run.amplitude_m <= LARGEST_AMPLITUDE_M,
+                format!("wear.amplitude_m must be over 0 and at most {LARGEST_AMPLITUDE_M}"),
+            ),
+            (
+                (1..=MOST_WEAR_CYCLES).contains(&run.cycles),
+                format!("wear.cycles must be 1 to {MOST_WEAR_CYCLES}"),
+            ),
+            (over_zero(run.energy_j), "wear.energy_j must be over 0, in J".into()),
+            (
+                run.friction_coefficient.is_none_or(|[low, high]| 0.0 <= low && low < high),
+                "wear.friction_coefficient is [smallest, largest], from 0".into(),
+            ),
+            (
+                run.largest_amplitude_m.is_none_or(|most| most > run.amplitude_m),
+                "wear.largest_amplitude_m must be over wear.amplitude_m".into(),
+            ),
+            (
+                run.temperature_c.is_none_or(f64::is_finite),
+                "wear.temperature_c must be a number, in °C".into(),
+            ),
+        ] {
+            faults.unless(good, at, what);
+        }
     }
 
     fn check_contact(&self, faults: &mut Faults) {

@@ -102,6 +102,8 @@ pub struct Plan {
     pub sync: Option<Spanned<SyncPlan>>,
     /// The shaker's levels before and after the campaign; none if absent.
     pub shaker: Option<Spanned<ShakerPlan>>,
+    /// A wear run; none if absent.
+    pub wear: Option<Spanned<WearPlan>>,
     /// Prior knowledge of contact and static arm; if absent, only the records count.
     pub contact: Option<Spanned<ContactPlan>>,
     /// The specimens' bulk; what is absent follows from their points, or widens the interval.
@@ -242,6 +244,30 @@ impl ShakerPlan {
             crate::advice::quoted(file)
         )
     }
+}
+
+/// A wear run: the shaker slides the contact for many cycles, each of which is reduced and stored.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WearPlan {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Amplitude of the specimens' relative displacement, m.
+    pub amplitude_m: f64,
+    /// Cycles of all wear runs of the file after which it ends.
+    pub cycles: u64,
+    /// Energy dissipated in all wear runs of the file after which it ends, J; no limit if absent.
+    pub energy_j: Option<f64>,
+    /// Smallest and largest coefficient of friction; it ends outside. No limit if absent.
+    pub friction_coefficient: Option<[f64; 2]>,
+    /// Largest amplitude of a cycle, m; it ends above. If absent, only the device's own limit of
+    /// 1.5 times the ordered amplitude.
+    pub largest_amplitude_m: Option<f64>,
+    /// Largest temperature of the specimen, °C; it ends above. No limit if absent.
+    pub temperature_c: Option<f64>,
+    /// Channels whose sum is the normal load; `contact.normal_load_n` if there are none.
+    #[serde(default)]
+    pub normal_load: Vec<String>,
 }
 
 /// Prior knowledge of contact and static arm, from drawings or a balance.

@@ -12,7 +12,8 @@
 //! of its row: a new column is one new line there (and its value where the row is constructed). A
 //! new table is a new `*_table.rs` and a line in `schema.rs`. The rows are: `record_table.rs`
 //! (records, their seals, overrules), `cell_table.rs`, `session_table.rs` (sessions,
-//! channels, sensors), `level_table.rs`, `frf_table.rs`, `notes.rs` (plans, log).
+//! channels, sensors), `level_table.rs`, `frf_table.rs`, `wear_table.rs` (blocks of cycles),
+//! `notes.rs` (plans, log).
 //!
 //! Checks whether the open file is still the one with its name. A file that was replaced, removed
 //! or emptied while it is open accepts every record without an error, but the records are lost.
@@ -75,6 +76,7 @@ pub mod session_table;
 pub mod stored;
 mod table;
 pub mod verify;
+pub mod wear_table;
 #[cfg(test)]
 mod wide_samples_tests;
 

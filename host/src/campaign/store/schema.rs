@@ -22,8 +22,8 @@ use super::record_table::Overrule;
 use super::record_table::RecordRow;
 use super::session_table::TemperatureRow;
 use super::session_table::{ChannelColumns, Sensor, SessionInfo};
-use super::table::{SINCE_3, create};
-use super::{APPLICATION_ID, Store, VERSION, chain, session_table};
+use super::table::{SINCE_3, create, stay};
+use super::{APPLICATION_ID, Store, VERSION, chain, session_table, wear_table};
 use crate::campaign::plan::Plan;
 use rusqlite::Connection;
 use std::collections::HashMap;
@@ -116,17 +116,6 @@ pub(super) fn missing_calibrations(connection: &Connection) -> rusqlite::Result<
     Ok(if there { String::new() } else { create::<Calibration>() + &stay(APPEND_ONLY[4]) })
 }
 
-/// The triggers that prevent changes to the rows of a table.
-fn stay((table, row): (&str, &str)) -> String {
-    let one = |(name, event, done): (&str, &str, &str)| {
-        format!(
-            "CREATE TRIGGER {table}_{name} BEFORE {event} ON {table}\n\
-             BEGIN SELECT RAISE(ABORT, '{row} never {done}'); END;\n"
-        )
-    };
-    [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")].map(one).concat()
-}
-
 /// The SQL that creates an empty file.
 pub(super) fn tables() -> String {
     let tables = [
@@ -172,6 +161,7 @@ fn ours() -> rusqlite::Result<&'static Objects> {
     let empty = Connection::open_in_memory()?;
     empty.execute_batch(&tables())?;
     empty.execute_batch(&session_table::tables())?;
+    empty.execute_batch(&wear_table::tables())?;
     let made = objects(&empty)?;
     Ok(OURS.get_or_init(|| made))
 }
@@ -230,6 +220,9 @@ pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<String>> 
     names.retain(|name| version > super::OLDEST || !later(name));
     // created on demand
     names.retain(|name| !["clocks", "edges"].contains(&name.as_str()));
+    if !wear_table::there(connection)? {
+        names.retain(|name| !name.starts_with("wear_"));
+    }
     if version >= 3 {
         for table in TYPED.into_iter().filter(|table| found.contains_key(*table)) {
             if !connection.column_exists(None, table, SINCE_3)? {

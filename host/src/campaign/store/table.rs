@@ -96,6 +96,17 @@ pub(super) fn create<R: Row>() -> String {
     tables.map(one).collect()
 }
 
+/// The triggers that prevent changes to the rows of a table.
+pub(super) fn stay((table, row): (&str, &str)) -> String {
+    let one = |(name, event, done): (&str, &str, &str)| {
+        format!(
+            "CREATE TRIGGER {table}_{name} BEFORE {event} ON {table}\n\
+             BEGIN SELECT RAISE(ABORT, '{row} never {done}'); END;\n"
+        )
+    };
+    [("stay", "UPDATE", "changed"), ("remain", "DELETE", "deleted")].map(one).concat()
+}
+
 /// A type that can be stored in a column.
 pub trait Stored: Sized {
     /// The value to be stored.

@@ -79,6 +79,10 @@ impl Store {
                 damage.push(Damage::of_file(what));
             }
         }
+        for wear in self.damaged_wear()? {
+            name(&[wear.table], wear.id);
+            damage.push(Damage::of_file(wear.to_string()));
+        }
         Ok(damage)
     }
 

@@ -238,7 +238,8 @@ pub fn measure(
 ) -> Result<Summary, CliError> {
     let path = store.path().to_owned();
     let Device { address, seed, log_tables } = device;
-    let mut session = Session::open(address.open(seed)?, &address.to_string())?;
+    let worn_j = store.wear_total()?.energy_j;
+    let mut session = Session::open(address.open_worn(seed, worn_j)?, &address.to_string())?;
     session.look_for_log_tables(Tables::new(log_tables));
     onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
     let Who { stage, yes, new_structure, further, stop } = who;

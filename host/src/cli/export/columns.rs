@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::analysed;
 use super::records::Written as Place;
-use super::{What, bad, estimates, levels, make_folder, tables};
+use super::{What, bad, estimates, levels, make_folder, tables, wear};
 use crate::analyse;
 use crate::campaign::plan::{Cell, configuration_name};
 use crate::campaign::store::Store;
@@ -124,6 +124,9 @@ impl Columns<'_> {
         ];
         for (name, table) in tables {
             files.insert(name.into(), write_table(&out.join(name), &table, &[]).map_err(bad)?);
+        }
+        if let Some(cycles) = wear::write_parquet(&store, &out.join("wear.parquet"))? {
+            files.insert("wear.parquet".into(), cycles);
         }
         self.write_campaign(&store, &files)?;
         let bytes: u64 = files.values().map(|file| file.bytes).sum();

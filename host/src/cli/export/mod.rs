@@ -33,6 +33,7 @@ mod estimates;
 pub(super) mod levels;
 mod records;
 mod tables;
+mod wear;
 
 /// Write everything that a campaign file contains in formats for other programs.
 ///
@@ -44,7 +45,8 @@ mod tables;
 /// DIR/channels.csv and calibrations.csv: scales, delays, sensors. DIR/levels: one file for each
 /// level of the shaker (velocities of both specimens and the load cells' sum, aligned in time; npz
 /// as `jointrig hysteresis` reads it), one with all its channels, and levels.csv with ordered and
-/// reached amplitudes. DIR/results.json and report.html. DIR/plan.toml and archive.json: the plan,
+/// reached amplitudes. DIR/wear.csv: every cycle of wear runs, which `import` does not read back.
+/// DIR/results.json and report.html. DIR/plan.toml and archive.json: the plan,
 /// and everything else of the file, with which `jointrig import DIR --into NEW.jrig` makes the same
 /// campaign again.
 ///
@@ -208,6 +210,14 @@ impl Files<'_> {
         if levels.count > 0 {
             tables.push("levels/levels.csv".into());
             told.push(format!("{}: {} levels of the shaker", folder.display(), levels.count));
+        }
+        let worn = out.join("wear.csv");
+        let cycles = wear::write_csv(&store, &worn)?;
+        if cycles > 0 {
+            told.push(format!(
+                "{}: {cycles} cycles of wear runs; `jointrig import` does not read them back",
+                worn.display()
+            ));
         }
         let exported = Exported {
             with_records: !without_records,

@@ -39,6 +39,7 @@ pub fn document(found: Findings) -> Results {
         modal,
         first_mode: found.first_mode.map(with_meaning),
         hysteresis,
+        wear: found.wear,
         checks,
         refused,
         missing,

@@ -304,7 +304,9 @@ fn tables_of(results: &Results, chapter: Chapter) -> Vec<Option<String>> {
         Chapter::Joint => {
             vec![tables::recommended(results), tables::joint(results), tables::refusals(results)]
         }
-        Chapter::Loops => vec![tables::hysteresis(results), tables::static_arm(results)],
+        Chapter::Loops => {
+            vec![tables::hysteresis(results), tables::static_arm(results), tables::wear(results)]
+        }
     }
 }
 

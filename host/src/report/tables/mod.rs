@@ -13,12 +13,14 @@ pub use joint::{joint, refusals};
 pub use loops::{decay, hysteresis, side_by_side, static_arm};
 pub use modes::modes;
 pub use provenance::{calibrations, completeness, provenance};
+pub use wear::wear;
 
 mod checks;
 mod joint;
 mod loops;
 mod modes;
 mod provenance;
+mod wear;
 
 /// Text for an unknown value.
 pub(super) const UNKNOWN: &str = "–";

@@ -218,6 +218,7 @@ pub fn missing(missing: &Missing) -> String {
         Missing::Estimate(error) => format!("No estimate with an interval by Eq. A.1: {error}."),
         Missing::Level(told) => told.clone(),
         Missing::LevelLoop { level, error } => format!("Shaker, {level}: no loop: {error}."),
+        Missing::Wear(told) => format!("The wear runs cannot be read: {told}."),
         Missing::EffectiveMass => {
             "No loops of the corrected force: the static arm's effective mass is not known. Hits on B alone give it, or stuck loops of the shaker at three \
              frequencies or more; or state it (--effective-mass KG)."

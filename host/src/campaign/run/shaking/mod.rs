@@ -12,6 +12,8 @@
 //! record spans from rest to rest, so that the ratio of its spectra is the structure's FRF,
 //! independent of the sweep rate and of the steps.
 //!
+//! [`wear`] is a run of many cycles, each of which is reduced and stored.
+//!
 //! [`record()`] turns a stored level into a hysteresis record: only scales, sums and delays are
 //! applied.
 
@@ -38,6 +40,7 @@ use num_complex::Complex;
 use order::Orders;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -45,6 +48,7 @@ pub use error::{ShakeError, Shortfall};
 
 mod error;
 mod order;
+pub mod wear;
 
 /// Longest settling time of a level, s of the device's clock.
 const SETTLE_BOUND_S: f64 = 40.0;
@@ -101,42 +105,8 @@ pub fn run_watched(
     onlookers: &Onlookers,
     tell: &mut dyn FnMut(&Store, &Level, Option<&Outcome>),
 ) -> Result<Summary, ShakeError> {
-    let plan = store.plan()?;
-    let info = session.info()?;
-    let device = session.channels(&info)?;
-    let address = session.address().to_owned();
-    let unfit = |what| ShakeError::Unfit { address: address.clone(), what };
-    let (planned, remarks) = with_sensors(&plan, &device).map_err(unfit)?;
-    let channels = plan.along_sliding(store.calibrated(store.next_session()?, planned.clone())?);
-    error::check_fit(&address, &info, &channels, options)?;
-    let accepted = options.new_structure;
-    let changed =
-        same_or_accepted(store, &info, session.simulated(), accepted, ShakeError::AnotherStructure)?;
-    session.calibrate(&device, &channels)?;
-    let sync = plan.clock().map(|clock| session.take_clock(clock)).transpose()?;
-    let noted = SessionInfo {
-        address,
-        board: info.board.as_str().into(),
-        serial: info.serial.as_str().into(),
-        firmware_version: info.version.as_str().into(),
-        target: info.target.as_str().into(),
-        build: Hex(info.build),
-        schema_hash: Hex(session.hello().schema),
-    };
     let known = store.levels()?;
-    let id = store.begin_session(&noted, &planned)?;
-    sync.iter().try_for_each(|sync| store.note_clock(id, sync))?;
-    changed.iter().try_for_each(|what| store.note_another_structure(what))?;
-    remarks.iter().try_for_each(|remark| store.log(remark))?;
-    if let Some(simulated) = session.simulated() {
-        store.note_simulated(simulated)?;
-    }
-    let (epoch, _) = session.start(&channels)?;
-    let simulated = is_simulated_board(&info.board);
-    onlookers.watch.saw(&Seen::Stream { channels: &channels, simulated });
-    if info.stage {
-        assemble(session, &plan)?;
-    }
+    let Begun { plan, info, channels, session_id: id, epoch } = begin(store, session, options, onlookers)?;
     let load_cells = plan.load_cells(&channels);
     let info = &info;
     let channels = &channels;
@@ -194,12 +164,70 @@ pub fn run_watched(
     Ok(Summary { outcomes, interrupted: options.stop.load(Ordering::Relaxed) })
 }
 
-/// The first channel at the contact with a code at the end of its range.
-fn clipped(channels: &ChannelMap, samples: &Samples) -> Option<String> {
+/// A session that is noted in the file and whose stream runs, with the assembly on the table.
+struct Begun {
+    plan: Plan,
+    info: Info,
+    /// Those of [`Plan::along_sliding`].
+    channels: ChannelMap,
+    session_id: i64,
+    epoch: u32,
+}
+
+/// Checks that the device fits, notes the session, and starts the stream.
+fn begin(
+    store: &mut Store,
+    session: &mut Session,
+    options: &LevelOptions,
+    onlookers: &Onlookers,
+) -> Result<Begun, ShakeError> {
+    let plan = store.plan()?;
+    let info = session.info()?;
+    let device = session.channels(&info)?;
+    let address = session.address().to_owned();
+    let unfit = |what| ShakeError::Unfit { address: address.clone(), what };
+    let (planned, remarks) = with_sensors(&plan, &device).map_err(unfit)?;
+    let channels = plan.along_sliding(store.calibrated(store.next_session()?, planned.clone())?);
+    error::check_fit(&address, &info, &channels, options)?;
+    let accepted = options.new_structure;
+    let changed =
+        same_or_accepted(store, &info, session.simulated(), accepted, ShakeError::AnotherStructure)?;
+    session.calibrate(&device, &channels)?;
+    let sync = plan.clock().map(|clock| session.take_clock(clock)).transpose()?;
+    let noted = SessionInfo {
+        address,
+        board: info.board.as_str().into(),
+        serial: info.serial.as_str().into(),
+        firmware_version: info.version.as_str().into(),
+        target: info.target.as_str().into(),
+        build: Hex(info.build),
+        schema_hash: Hex(session.hello().schema),
+    };
+    let session_id = store.begin_session(&noted, &planned)?;
+    sync.iter().try_for_each(|sync| store.note_clock(session_id, sync))?;
+    changed.iter().try_for_each(|what| store.note_another_structure(what))?;
+    remarks.iter().try_for_each(|remark| store.log(remark))?;
+    if let Some(simulated) = session.simulated() {
+        store.note_simulated(simulated)?;
+    }
+    let (epoch, _) = session.start(&channels)?;
+    let simulated = is_simulated_board(&info.board);
+    onlookers.watch.saw(&Seen::Stream { channels: &channels, simulated });
+    if info.stage {
+        assemble(session, &plan)?;
+    }
+    Ok(Begun { plan, info, channels, session_id, epoch })
+}
+
+/// The first channel at the contact with a code at the end of its range in these scans.
+fn clipped(channels: &ChannelMap, samples: &Samples, scans: Range<usize>) -> Option<String> {
     let at_contact = |place: &usize| {
         matches!(channels.channels[*place].role, Role::SpecimenA | Role::SpecimenB | Role::LoadCell)
     };
-    let full = |place: &usize| samples.channel(*place).at_the_ends(channels.channels[*place].bits) > 0;
+    let full = |place: &usize| {
+        let own = samples.channel(*place).part(scans.start, scans.end);
+        own.at_the_ends(channels.channels[*place].bits) > 0
+    };
     (0..channels.len()).filter(at_contact).find(full).map(|place| channels.channels[place].name.to_string())
 }
 
@@ -350,7 +378,7 @@ impl Bench<'_> {
         orders.go_on(self.session, at + scans)?;
         orders.still_runs(self.session)?;
         let (samples, _) = self.session.cut(at..at + scans)?;
-        if let Some(channel) = clipped(self.channels, &samples) {
+        if let Some(channel) = clipped(self.channels, &samples, 0..samples.scans()) {
             return Err(ShakeError::Short(Shortfall::Clipped { channel }));
         }
         let moved = meter.amplitude(&samples);
