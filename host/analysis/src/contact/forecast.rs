@@ -222,6 +222,7 @@ pub fn forecast(
         moved.iter().zip(offsets).map(|(moved, offset)| moved + offset).collect::<Vec<Complex<f64>>>()
     };
     let mut cells = measured(&blocks);
+    let measured = cells.len();
     let mut latent = solver::latent(&blocks, &solution.bins);
     let known = p.len();
     for own in planned {
@@ -242,7 +243,7 @@ pub fn forecast(
         }
     }
     posterior.extend(&parameters.all()[known..]);
-    let information = if p.len() == known {
+    let information = if cells.len() == measured {
         information
     } else {
         // the same, with rows and parameters that carry no information yet

@@ -18,7 +18,7 @@ fn positive(n: usize, seed: usize) -> DMatrix<f64> {
 #[test]
 fn an_update_of_some_parameters_is_the_inverse_of_the_changed_matrix() {
     // units as different as those of positions and compliances
-    let unit = DVector::from_fn(9, |i, _| 10_f64.powi(2 - 3 * i as i32));
+    let unit = DVector::from_iterator(9, (0..9).map(|i| 10_f64.powi(2 - 3 * i)));
     let scaled = |m: &DMatrix<f64>| solver::scaled(m, &unit.map(f64::recip));
     let curvature = scaled(&positive(9, 0));
     let noise = scaled(&(positive(9, 5) * 0.05));
