@@ -83,7 +83,8 @@ pub fn test(project: &Project, folder: &Path, wheel: &Path, wine: &Wine, jointri
         .with_context(|| format!("could not write {}", paths.display()))?;
 
     let mut pytest = wine.command(&program);
-    pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).args(LEFT_OUT);
+    // names of tests are relative to this folder, which pytest 9.2 no longer takes for the root
+    pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir=."]).args(LEFT_OUT);
     pytest.current_dir(project.root.join("host/python/tests")).stdin(Stdio::null());
     // files and output are UTF-8, as the tests take them to be
     pytest.env("PYTHONUTF8", "1").env("PYTHONDONTWRITEBYTECODE", "1").env("JOINTRIG_BIN", jointrig);
