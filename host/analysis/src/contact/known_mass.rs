@@ -5,7 +5,6 @@
 //! softer. (Established practice: ISO 7626-5, ratio calibration.)
 
 use super::BAND;
-use super::parameters::{GAINS, HAMMER, KNOWN_MASS};
 use crate::frf::MotionQuantity;
 use crate::frf::noise::shared_by_lines;
 use crate::spectra::CrossSpectra;
@@ -23,19 +22,6 @@ pub struct KnownMass {
     pub point: Option<[f64; 2]>,
     /// Which of its axes that is: 0, 1 or 2.
     pub axis: usize,
-}
-
-impl KnownMass {
-    /// The sensors compared.
-    pub(super) fn compared(&self) -> Vec<Compared> {
-        let point = GAINS + 2 + self.axis;
-        let sensors = [(GAINS, self.spots[0]), (GAINS + 1, self.spots[1]), (point, self.point)];
-        let one = |(gain, ratio): (usize, Option<[f64; 2]>)| {
-            let [ratio, sigma] = ratio?;
-            Some(Compared { gain, value: ratio.ln(), sigma: sigma / ratio })
-        };
-        sensors.into_iter().filter_map(one).collect()
-    }
 }
 
 /// The ratio |s m v / F| of one output of the hits on a body of `mass_kg`, and its standard
@@ -67,29 +53,6 @@ pub fn mass_ratio(
 
 /// Relative standard deviation below which a ratio is not known: windows and delays.
 const ROUNDING: f64 = 1e-4;
-
-/// A sensor compared with the hammer on the known mass.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Compared {
-    /// Index of the sensor's gain.
-    gain: usize,
-    /// Logarithm of the measured ratio: of (1 + the sensor's gain) / (1 + the hammer's gain), less
-    /// the mass's error.
-    value: f64,
-    /// Standard deviation of its noise.
-    sigma: f64,
-}
-
-impl Compared {
-    /// The ratio at these parameters minus the measured one, in standard deviations, and its
-    /// derivatives.
-    pub fn deviation(&self, p: &[f64]) -> (f64, [(usize, f64); 3]) {
-        let [sensor, hammer] = [1.0 + p[self.gain], 1.0 + p[HAMMER]];
-        let value = (sensor / hammer).ln() - p[KNOWN_MASS];
-        let by = [(self.gain, sensor.recip()), (HAMMER, -hammer.recip()), (KNOWN_MASS, -1.0)];
-        ((value - self.value) / self.sigma, by.map(|(at, slope)| (at, slope / self.sigma)))
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -124,23 +87,6 @@ mod tests {
             // the window turns a delay of 20 µs into a factor of exp(−σ 20 µs)
             assert!((ratio / gains - 1.0).abs() < 1e-4, "{ratio}");
             assert!(sigma < 2e-4, "{sigma}");
-        }
-    }
-
-    #[test]
-    fn derivatives_are_those_of_the_deviation() {
-        let mass = KnownMass { sigma: 0.002, spots: [None, Some([0.98, 0.001])], point: None, axis: 2 };
-        let [compared] = &mass.compared()[..] else { panic!("one sensor") };
-        let mut p = vec![0.0; KNOWN_MASS + 1];
-        (p[GAINS + 1], p[HAMMER], p[KNOWN_MASS]) = (0.03, -0.02, 0.001);
-        let (deviation, by) = compared.deviation(&p);
-        assert!((deviation - ((1.03_f64 / 0.98 / 0.98).ln() - 0.001) / (0.001 / 0.98)).abs() < 1e-9);
-        for (at, slope) in by {
-            let mut moved = p.clone();
-            moved[at] += 1e-6;
-            let difference = (compared.deviation(&moved).0 - deviation) / 1e-6;
-            // the second derivative is about 1/σ
-            assert!((difference / slope - 1.0).abs() < 1e-5, "{at}: {difference} {slope}");
         }
     }
 }

@@ -3,7 +3,7 @@
 //! standard deviations.
 
 use super::elastic;
-use super::known_mass::{Compared, KnownMass};
+use super::known_mass::KnownMass;
 use crate::substructuring::averaged::Priors as Positions;
 use serde::Serialize;
 
@@ -137,6 +137,29 @@ impl Parameter {
     }
 }
 
+/// A sensor compared with the hammer on the known mass.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compared {
+    /// Index of the sensor's gain.
+    gain: usize,
+    /// Logarithm of the measured ratio: of (1 + the sensor's gain) / (1 + the hammer's gain), less
+    /// the mass's error.
+    value: f64,
+    /// Standard deviation of its noise.
+    sigma: f64,
+}
+
+impl Compared {
+    /// The ratio at these parameters minus the measured one, in standard deviations, and its
+    /// derivatives.
+    pub fn deviation(&self, p: &[f64]) -> (f64, [(usize, f64); 3]) {
+        let [sensor, hammer] = [1.0 + p[self.gain], 1.0 + p[HAMMER]];
+        let value = (sensor / hammer).ln() - p[KNOWN_MASS];
+        let by = [(self.gain, sensor.recip()), (HAMMER, -hammer.recip()), (KNOWN_MASS, -1.0)];
+        ((value - self.value) / self.sigma, by.map(|(at, slope)| (at, slope / self.sigma)))
+    }
+}
+
 /// All parameters, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
@@ -203,7 +226,13 @@ impl Parameters {
     pub fn compare_on(&mut self, mass: &KnownMass) {
         self.own[KNOWN_MASS].sigma = mass.sigma;
         self.own[FORM].per_newton = true;
-        self.compared = mass.compared();
+        let point = GAINS + 2 + mass.axis;
+        let sensors = [(GAINS, mass.spots[0]), (GAINS + 1, mass.spots[1]), (point, mass.point)];
+        let compared = |(gain, ratio): (usize, Option<[f64; 2]>)| {
+            let [ratio, sigma] = ratio?;
+            Some(Compared { gain, value: ratio.ln(), sigma: sigma / ratio })
+        };
+        self.compared = sensors.into_iter().filter_map(compared).collect();
     }
 
     /// The sensors that are compared with the hammer on a known mass.
@@ -358,6 +387,35 @@ impl Cause {
             Cause::Bending => "bending",
             Cause::Drift => "drift",
             Cause::Misfit => "misfit",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_are_those_of_the_deviation() {
+        let mass = KnownMass { sigma: 0.002, spots: [None, Some([0.98, 0.001])], point: None, axis: 2 };
+        let mut parameters = Parameters::new(
+            &ContactPriors::default(),
+            1e-8,
+            [[0.0; 3]; 2],
+            elastic::priors([None, None], 0.01),
+        );
+        parameters.compare_on(&mass);
+        let [compared] = parameters.compared() else { panic!("one sensor") };
+        let mut p = vec![0.0; KNOWN_MASS + 1];
+        (p[GAINS + 1], p[HAMMER], p[KNOWN_MASS]) = (0.03, -0.02, 0.001);
+        let (deviation, by) = compared.deviation(&p);
+        assert!((deviation - ((1.03_f64 / 0.98 / 0.98).ln() - 0.001) / (0.001 / 0.98)).abs() < 1e-9);
+        for (at, slope) in by {
+            let mut moved = p.clone();
+            moved[at] += 1e-6;
+            let difference = (compared.deviation(&moved).0 - deviation) / 1e-6;
+            // the second derivative is about 1/σ
+            assert!((difference / slope - 1.0).abs() < 1e-5, "{at}: {difference} {slope}");
         }
     }
 }
