@@ -92,12 +92,16 @@ pub fn test(project: &Project, folder: &Path, wheel: &Path, wine: &Wine, jointri
     passed(&said).with_context(|| format!("pytest ended before its summary: {said}"))
 }
 
-/// The summary of pytest, such as `57 passed in 3.10s`; `None` if there is none, or if a test
-/// failed: Wine does not always pass on the exit code of a program that crashed.
+/// The summary of pytest, such as `69 passed, 4 deselected in 3.10s`; `None` if there is none, or
+/// if a test failed: Wine does not always pass on the exit code of a program that crashed.
 fn passed(said: &str) -> Option<String> {
     let last = said.lines().rev().find(|line| !line.trim().is_empty())?.trim();
-    (last.contains(" passed in ") && !last.contains("failed") && !last.contains("error"))
-        .then(|| last.to_owned())
+    let (counts, seconds) = last.rsplit_once(" in ")?;
+    let all_well = |count: &str| count.ends_with(" passed") || count.ends_with(" deselected");
+    (seconds.starts_with(|digit: char| digit.is_ascii_digit())
+        && counts.contains(" passed")
+        && counts.split(", ").all(all_well))
+    .then(|| last.to_owned())
 }
 
 #[cfg(test)]
@@ -107,6 +111,8 @@ mod tests {
     #[test]
     fn a_run_without_summary_or_with_a_failure_has_not_passed() {
         assert_eq!(passed("....\n57 passed in 3.10s\n\n").as_deref(), Some("57 passed in 3.10s"));
+        let some = "69 passed, 4 deselected in 157.89s (0:02:37)";
+        assert_eq!(passed(&format!("..\n{some}\n")).as_deref(), Some(some));
         for said in ["", "F..FF....", "1 failed, 56 passed in 3s", "56 passed, 1 error in 3s"] {
             assert_eq!(passed(said), None, "{said}");
         }

@@ -350,13 +350,6 @@ impl Plan {
                 at,
                 format!("known_mass.sigma must be a relative standard deviation from 0 to {WORST_GAIN}"),
             );
-            faults.unless(
-                self.known_mass_cell().is_some(),
-                at,
-                format!(
-                    "known_mass needs a block of configuration B with one impact and one response of grouping {ON_KNOWN_MASS}"
-                ),
-            );
         }
         for point in &self.geometry.impact {
             let (at, own) = (point.span().start, point.get_ref());
@@ -370,6 +363,7 @@ impl Plan {
                 ),
             );
         }
+        let mut separate = true;
         for block in &self.configuration {
             let (at, name) = (block.name.span().start, block.name.get_ref());
             let hit = block.impacts.iter().map(|own| self.impact_is(own.get_ref(), &[ON_KNOWN_MASS]));
@@ -378,6 +372,7 @@ impl Plan {
             if !on_mass.contains(&true) {
                 continue;
             }
+            separate &= !on_mass.contains(&false);
             faults.unless(
                 !on_mass.contains(&false),
                 at,
@@ -391,6 +386,16 @@ impl Plan {
                 at,
                 format!(
                     "configuration `{name}`: points of grouping {ON_KNOWN_MASS} need [known_mass], and are measured in B"
+                ),
+            );
+        }
+        if let Some(own) = self.known_mass.as_ref().filter(|_| separate) {
+            faults.unless(
+                self.known_mass_cell().is_some(),
+                own.span().start,
+                format!(
+                    "known_mass needs a block of configuration B with one impact and one response of grouping {ON_KNOWN_MASS}, \
+                     which the 3-D vibrometer measures along the sliding direction"
                 ),
             );
         }
