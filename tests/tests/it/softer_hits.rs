@@ -4,15 +4,15 @@
 use jointrig::campaign::plan::CONTACT;
 use jointrig::campaign::store::Store;
 use jointrig::device::address::Address;
-use jointrig_tests::campaign::{rows, run};
+use jointrig_tests::campaign::{rows, run, without_known_mass};
 
 #[test]
 fn every_second_cell_of_an_impact_begins_with_the_softer_force() {
-    let (head, rest) = CONTACT.split_once("# B alone").unwrap();
+    let whole = without_known_mass(CONTACT);
+    let (head, rest) = whole.split_once("# B alone").unwrap();
     let (_, geometry) = rest.split_once("# Grouping").unwrap();
     let cells = "[[configuration]]\nname = \"AJB\"\nimpacts = [\"AZ1\", \"AZ3\"]\nresponses = [\"C1\", \"C3\", \"B1\"]\n\n";
     let plan = format!("{head}{cells}# Grouping{geometry}")
-        .replace("[known_mass]\nmass_kg = 3.0\nsigma = 0.002\n", "")
         .replace("wanted = 3", "wanted = 2")
         .replace("length_s = 2.0", "length_s = 1.0")
         .replace("exponential_per_s = 2.3", "exponential_per_s = 4.6");
