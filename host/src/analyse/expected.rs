@@ -8,7 +8,7 @@
 use super::cell::CellName;
 use super::contact_answer::reads;
 use super::plan_geometry::geometry;
-use crate::campaign::plan::{KNOWN_MASS_SIGMA, Plan, structure};
+use crate::campaign::plan::{Plan, structure};
 use crate::contact::{
     Axes, BAND, ContactCell, ContactError, ContactPriors, Input, KnownMass, SIGMA_PER_S, Stiffness, stiffness,
 };
@@ -57,12 +57,13 @@ pub fn expected(plan: &Plan) -> Option<Vec<Expected>> {
     CONTACTS_N_PER_M.into_iter().map(|k| one(plan, &geometry, k)).collect()
 }
 
-/// What the plan's known mass will show: nothing is off, and noise is far below the mass's own error.
+/// What the plan's known mass will show: nothing is off, and noise is far below the mass's own
+/// error.
 fn expected_on_mass(plan: &Plan) -> Option<KnownMass> {
     let (own, cell) = (plan.known_mass.as_ref()?.get_ref(), plan.known_mass_cell()?);
     let right = Some([1.0, 1e-3]);
     let spots = if cell.lasers { [right; 2] } else { [None; 2] };
-    Some(KnownMass { sigma: own.sigma.unwrap_or(KNOWN_MASS_SIGMA), spots, point: right, axis: cell.axis })
+    Some(KnownMass { sigma: own.sigma(), spots, point: right, axis: cell.axis })
 }
 
 /// A cell's spectra, with what identifies its hits.

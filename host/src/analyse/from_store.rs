@@ -15,7 +15,7 @@ use super::missing::Missing;
 use super::modal::{FoundModes, NoModes};
 use super::plan_geometry::{geometry, places};
 use super::wear::wear;
-use crate::campaign::plan::{KNOWN_MASS_SIGMA, Plan, ResponsePoint, structure};
+use crate::campaign::plan::{Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
@@ -528,7 +528,7 @@ impl Measurements for CampaignFile {
         Some(MassCell {
             name: CellName { configuration: Structure::B, impact: cell.impact, response: cell.response },
             mass_kg: own.mass_kg,
-            sigma: own.sigma.unwrap_or(KNOWN_MASS_SIGMA),
+            sigma: own.sigma(),
             axis: cell.axis,
             lasers: cell.lasers,
         })

@@ -197,8 +197,8 @@ pub fn outlook(store: &Store, times: Times, averaged: &mut Averaged) -> Result<O
         .filter(|name| reads(geometry, name) && !file.is_fixed(&name.response) && open(name))
         .filter(|name| !all.averages.iter().any(|own| own.name == *name))
         .collect();
-    // where the hits on the known mass cannot be read, which the analysis reports, k_T is as wide as
-    // without them
+    // if the hits on the known mass cannot be read, the analysis reports it, and the interval is
+    // that without them
     let mass = known_mass::compared(&file).unwrap_or_default();
     let planned: Vec<PlannedCell<'_>> = without.iter().filter_map(|name| planned(&file, name)).collect();
     let (mut found, mut forecast) = forecast(&input(&file, cells, mass), &planned)?;

@@ -3,10 +3,10 @@
 //! At the most likely parameters the information of every signal is known. One more hit in a cell
 //! lowers the noise of the cell's signals and nothing else: positions, aims, gains and delays keep
 //! their priors, and the part of a cell's signals that the model does not explain stays, or shows
-//! once the noise is low enough, so that the interval tends to a limit. A change of the noise changes the information of the cell's impact, which
-//! depends on some of the parameters only: with A the curvature of the posterior without what noise
-//! contributes to it, and ΔA that change, A⁻¹ changes by an update of that rank (Woodbury). No
-//! candidate is fitted again.
+//! once the noise is low enough, so that the interval tends to a limit. A change of the noise
+//! changes the information of the cell's impact, which depends on some of the parameters only:
+//! with A the curvature of the posterior without what noise contributes to it, and ΔA that change,
+//! A⁻¹ changes by an update of that rank (Woodbury). No candidate is fitted again.
 //!
 //! The information of new hits is that of the present ones per hit. So the prediction lacks what
 //! only new data can show: a contradiction, a bad place, and the scatter of the estimates of noise

@@ -478,13 +478,20 @@ pub struct KnownMassPlan {
     /// Its mass, kg.
     pub mass_kg: f64,
     /// Relative standard deviation of the comparison from the mass, and from hits and vibrometers
-    /// beside its centre of gravity; [`KNOWN_MASS_SIGMA`] if absent.
+    /// beside its centre of gravity; 0.002 if absent.
     pub sigma: Option<f64>,
+}
+
+impl KnownMassPlan {
+    /// Relative standard deviation of the comparison: the stated one, or the usual one.
+    pub fn sigma(&self) -> f64 {
+        self.sigma.unwrap_or(KNOWN_MASS_SIGMA)
+    }
 }
 
 /// Relative standard deviation of a comparison on a known mass: a cube of 3 kg that is struck and
 /// seen within 1 mm of its middle.
-pub const KNOWN_MASS_SIGMA: f64 = 0.002;
+const KNOWN_MASS_SIGMA: f64 = 0.002;
 
 /// Grouping of the points on the known mass: they are part of no structure.
 pub const ON_KNOWN_MASS: u8 = 7;

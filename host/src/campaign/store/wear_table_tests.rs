@@ -125,7 +125,7 @@ fn nothing_of_a_block_can_be_changed_unseen() {
     let change = |sql: &str| store.connection.execute(sql, []);
     assert!(change("UPDATE wear_blocks SET energy_j = 1.0").is_err());
     assert!(change("DELETE FROM wear_loops").is_err());
-    // by somebody who removes the triggers
+    // by a program that removes the triggers first
     store.connection.execute_batch("DROP TRIGGER wear_blocks_stay").expect("dropped");
     change("UPDATE wear_blocks SET cycles = zeroblob(length(cycles)) WHERE id = 2").expect("changed");
     let found = store.verify().expect("verified");

@@ -96,7 +96,7 @@ impl Next {
         let mut limits = say::limits(&found);
         if let (Some(until), Some(route)) = (self.until, &route) {
             let told = say::route(&found, until, self.further_hits, route);
-            // a half width that is not reached is told with its limit
+            // for a half width that is not reached, the smallest one that further hits give
             limits.retain(|limit| !told.ends_with(limit.as_str()));
             output::lines([told])?;
         }
