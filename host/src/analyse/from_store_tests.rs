@@ -52,6 +52,12 @@ fn map(late_ns: u32) -> ChannelMap {
 /// A hit at the trigger, and a decay at 208 Hz in all other channels, delayed by the channel's
 /// delay; T and Δx in phase with the slope above.
 fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
+    recording_off(map, peak_n, 0)
+}
+
+/// As [`recording`], with all channels but the force off by this many codes.
+fn recording_off(map: &ChannelMap, peak_n: f64, codes: i16) -> Recording {
+    let off = |role: Role| if role == Role::HammerForce { 0 } else { codes };
     let scans = TRIGGER + 2 * RATE as usize;
     let at = |scan: usize| (scan as f64 - TRIGGER as f64) / f64::from(RATE);
     let (w, decay) = (TAU * 208.0, 20.0);
@@ -80,7 +86,7 @@ fn recording(map: &ChannelMap, peak_n: f64) -> Recording {
         .flat_map(|c| {
             (0..scans).map(move |s| {
                 let late_s = f64::from(c.delay_ns) * 1e-9;
-                (value(c.role, at(s) - late_s) / c.units_per_code()).round() as i16
+                (value(c.role, at(s) - late_s) / c.units_per_code()).round() as i16 + off(c.role)
             })
         })
         .collect();
@@ -116,6 +122,16 @@ fn campaign(path: &Path, late_ns: &[u32]) -> Store {
 /// As [`campaign`], with this plan; the reading of the vibrometer on specimen A is `ldv_a` times
 /// its motion along z.
 fn campaign_of(path: &Path, plan: &str, late_ns: &[u32], ldv_a: f32) -> Store {
+    campaign_with(path, plan, late_ns, &|map, peak_n| recording(&read_by(map, ldv_a), peak_n))
+}
+
+/// As [`campaign`], with this plan and these recordings.
+fn campaign_with(
+    path: &Path,
+    plan: &str,
+    late_ns: &[u32],
+    recorded: &dyn Fn(&ChannelMap, f64) -> Recording,
+) -> Store {
     let mut store = Store::create(path, plan, "small.toml").expect("created");
     let info = SessionInfo {
         address: "sim:".into(),
@@ -145,7 +161,7 @@ fn campaign_of(path: &Path, plan: &str, late_ns: &[u32], ldv_a: f32) -> Store {
                 session: *session,
                 utc: utc_now(),
                 utc_error_s: None,
-                recording: recording(&read_by(map, ldv_a), peak),
+                recording: recorded(map, peak),
                 verdict,
             };
             store.insert(&record, &Counters::new()).expect("stored");
@@ -174,6 +190,39 @@ fn a_vibrometer_that_looks_the_other_way_changes_nothing_if_the_plan_says_so() {
     assert!(usual.as_ref().expect("looked for").impacts.is_some());
     assert!(found(&campaign_of(&path("said.jrig"), &plan, &[LATE_NS], -1.0)) == usual, "to the last bit");
     assert!(found(&campaign_of(&path("unsaid.jrig"), SMALL, &[LATE_NS], -1.0)) != usual);
+}
+
+#[test]
+fn what_a_sensor_shows_before_the_hit_changes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // codes by which all sensors but the hammer's are off, as by a body that still sways
+    let hits = |codes: i16| {
+        let path = folder.path().join(format!("{codes}.jrig"));
+        let store = campaign_with(&path, SMALL, &[LATE_NS], &|map, peak_n| recording_off(map, peak_n, codes));
+        let file = CampaignFile::open(&store, KnownContact::default()).expect("readable");
+        let mut all = Vec::new();
+        for name in file.cells() {
+            file.each_hit(&name, true, &mut |hit, _| all.push(hit.clone())).expect("readable");
+        }
+        all
+    };
+    let (usual, off) = (hits(0), hits(700));
+    assert!(!usual.is_empty());
+    for (usual, off) in usual.iter().zip(&off) {
+        assert!(usual.contact.is_some());
+        let signals = |hit: &Hit| {
+            let contact = hit.contact.clone().expect("measured");
+            let own = [contact.specimen_a_m_per_s, contact.specimen_b_m_per_s, contact.tangential_n];
+            hit.response.iter().cloned().chain(own).collect::<Vec<_>>()
+        };
+        for (usual, off) in signals(usual).iter().zip(&signals(off)) {
+            let largest = usual.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            // rounding of sums of 192 samples
+            let same = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * largest;
+            assert!(usual.iter().zip(off).all(same));
+        }
+        assert_eq!(usual.force_n, off.force_n);
+    }
 }
 
 #[test]

@@ -244,6 +244,15 @@ impl<'a> ChannelView<'a> {
         each_type!(ChannelView, self, samples => of(samples, factor, out));
     }
 
+    /// Mean of the samples; `None` if there are none.
+    pub fn mean(self) -> Option<f64> {
+        fn of<T: Copy + Into<f64>>(samples: &[T]) -> f64 {
+            samples.iter().map(|sample| (*sample).into()).sum()
+        }
+        let sum = each_type!(ChannelView, self, samples => of(samples));
+        (!self.is_empty()).then(|| sum / self.len() as f64)
+    }
+
     /// Passes each sample to `put` with the value in the same place of `targets`.
     pub fn put(self, targets: &mut [f64], put: impl Fn(&mut f64, f64)) {
         fn of<T: Copy + Into<f64>>(samples: &[T], targets: &mut [f64], put: impl Fn(&mut f64, f64)) {
