@@ -117,9 +117,10 @@ pub struct Block {
     pub at_m: [f64; 3],
     /// Unit vector of its direction.
     pub direction: [f64; 3],
-    /// True if the effect of shifting the impact is derived from impacts on the same body;
-    /// otherwise impacts on another body are used.
-    pub aim_known: bool,
+    /// Whether the fit uses its signals. Not those of an impact whose cells were aimed one by one
+    /// where nothing shows what the hammer's aim changes: their differences would be taken for the
+    /// specimens' bending. Its motion is computed all the same.
+    pub counts: bool,
     /// On B alone: index of the parameter for the z component of the hammer force.
     pub along_z: Option<usize>,
     /// The cells.
@@ -375,6 +376,7 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     for impact in &impacts {
         all.push(block(impact, &impacts, &points, input, &chosen, parameters)?);
     }
+    count_known_aims(&mut all, input.priors.positions.aim_m);
     // a shift of one impact is formed from the motion of other impacts, line by line
     let everywhere: Vec<Vec<f64>> =
         all.iter().map(|block| block.lines.iter().map(|line| line.frequency_hz).collect()).collect();
@@ -389,6 +391,20 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
         block.index(count);
     }
     Ok(all)
+}
+
+/// Decides which blocks of the assembly count. On entry [`Block::counts`] says whether impacts on the
+/// same body show what a shift of the impact changes. Without any error of aim, or with all signals
+/// from the same hits, it does not matter; where no block would count, all do.
+fn count_known_aims(blocks: &mut [Block], aim_m: f64) {
+    for block in blocks.iter_mut() {
+        let same_hits = block.cells.iter().skip(1).all(|cell| cell.first.is_some());
+        block.counts |= block.along_z.is_some() || same_hits || aim_m == 0.0;
+    }
+    let assembled = |block: &Block| block.along_z.is_none();
+    if !blocks.iter().any(|block| assembled(block) && block.counts) {
+        blocks.iter_mut().for_each(|block| block.counts = true);
+    }
 }
 
 /// Standard deviation of the position of a body's points, m, and its cause.
@@ -651,7 +667,7 @@ fn block(
     };
     Ok(Block {
         impact: impact.name.to_owned(),
-        aim_known,
+        counts: aim_known,
         grouping: impact.grouping,
         at_m: impact.at_m,
         direction: impact.direction,

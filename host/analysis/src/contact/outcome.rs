@@ -334,14 +334,7 @@ impl Signals {
     /// The model's residual of these signals in some bins.
     pub fn left<'a>(self, blocks: &[Block], bins: impl Iterator<Item = &'a Bin>) -> SignalResidual {
         let alone = self == Self::Calibration;
-        // if the effect of the hammer's aim is only partly known, its errors are not the points'
-        // fault: such impacts are left out
-        let judged =
-            |block: &Block| block.aim_known || !blocks.iter().any(|b| b.aim_known && b.along_z.is_none());
-        let own = bins.filter(|bin| {
-            let block = &blocks[bin.block];
-            block.along_z.is_some() == alone && (alone || judged(block))
-        });
+        let own = bins.filter(|bin| blocks[bin.block].along_z.is_some() == alone);
         let kinds = own.flat_map(|bin| self.kinds().iter().map(move |k| bin.normal.kinds[*k]));
         let [chi, expected, signal] =
             kinds.fold([0.0; 3], |sum: [f64; 3], of| std::array::from_fn(|i| sum[i] + of[i]));

@@ -192,7 +192,7 @@ fn normalisation(block: &Block, bin: &Bin) -> f64 {
         };
         residual.rows.iter().enumerate().map(row).sum()
     };
-    bin.residuals.iter().map(of_line).sum()
+    if block.counts { bin.residuals.iter().map(of_line).sum() } else { 0.0 }
 }
 
 /// End of a search from `p` with the current noise, and whether it converged.
@@ -396,7 +396,7 @@ pub fn certainty(
 pub fn of_noise(blocks: &[Block], bin: &Bin, p: &[f64]) -> Normal {
     let block = &blocks[bin.block];
     let mut normal = Normal::none(block.parameters.len());
-    for residual in &bin.residuals {
+    for residual in bin.residuals.iter().filter(|_| block.counts) {
         normal.add_of_noise(block, residual.line, p);
     }
     normal
@@ -459,6 +459,9 @@ fn bin(
         motion.push(moved);
         residuals.push(residual);
     }
+    if !block.counts {
+        normal = Normal::none(block.parameters.len());
+    }
     Some(Bin { block: b, low_hz, normal, residuals, motion })
 }
 
@@ -482,7 +485,7 @@ fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Comple
 /// the motion.
 pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
     let mut normal = Normal::none(block.parameters.len());
-    for line in 0..block.lines.len() {
+    for line in (0..block.lines.len()).filter(|_| block.counts) {
         normal.add(block, line, p, shifts(block, motion, line).as_ref())?;
     }
     Some(normal.information / shared)
