@@ -259,7 +259,11 @@ pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
 /// The same plan with shaker levels: 0.15 µm between the spots, at which every drawn contact
 /// sticks.
 pub fn levels_plan(rig: &RigConfig) -> String {
-    format!("{}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n", contact_plan(rig))
+    let plan = contact_plan(rig);
+    let hits = "impacts = [\"AZ1\", \"AZ2\", \"AZ3\"]";
+    assert!(plan.contains(hits));
+    let where_it_pushes = plan.replace(hits, &hits.replace("\"AZ3\"", "\"AZ3\", \"I_MZ\""));
+    format!("{where_it_pushes}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n")
 }
 
 #[cfg(test)]

@@ -47,7 +47,7 @@ def short_contact_plan(path: Path) -> Path:
     text = re.sub(r'impacts = \["BZ1".*\]', 'impacts = ["BZ1", "BZ2", "BZ3"]', text)
     cells = 'impacts = ["AZ1", "AZ3"]\nresponses = ["C1", "C2", "C3", "B1", "B2", "BL"]'
     text = re.sub(r'impacts = \["AZ1".*\]\nresponses = .*', cells, text)
-    text = text.replace("wanted = 3", "wanted = 2").replace("length_s = 2.0", "length_s = 1.0")
+    text = text.replace("wanted = 6", "wanted = 2").replace("length_s = 2.0", "length_s = 1.0")
     path.write_text(text.replace("exponential_per_s = 2.3", "exponential_per_s = 4.6"))
     return path
 

@@ -41,7 +41,7 @@ struct Sound {
 #[test]
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: rigs not used in development"]
 fn rigs_not_used_in_development() {
-    let numbers: Vec<u64> = (0..count("RIGS", 200)).map(|n| count("FIRST", 9000) + n).collect();
+    let numbers: Vec<u64> = (0..count("RIGS", 200)).map(|n| count("FIRST", 10000) + n).collect();
     let all = each(&numbers, |number| {
         let rig = sound(*number);
         let found = measured(*number, &rig, &rig);
@@ -91,7 +91,7 @@ fn rigs_not_used_in_development() {
 #[test]
 fn a_contact_that_changes_while_it_is_hit_is_noticed() {
     let mut rig = RigConfig::elastic();
-    rig.contact.drift_per_hit = 0.1 / 201.0;
+    rig.contact.drift_per_hit = 0.1 / 342.0;
     let found = results(1, &rig, &contact_plan(&rig));
     let (drifts, answer) = (found.check("contact-steady").unwrap(), found.answer.as_ref().unwrap());
     let answer = &answer.contact;
@@ -250,7 +250,7 @@ const FALSE: [False; 17] = [
     ("delays of 20 µs", |rig, _| rig.errors.skew_s *= 10.0, &["delay"]),
     (
         "k_T drifts by 5 to 10 %",
-        |rig, i| rig.contact.drift_per_hit = [0.07, -0.07, 0.1, 0.05, -0.1][i] / 201.0,
+        |rig, i| rig.contact.drift_per_hit = [0.07, -0.07, 0.1, 0.05, -0.1][i] / 342.0,
         &["contact changed"],
     ),
     (
@@ -271,7 +271,7 @@ const FALSE: [False; 17] = [
 #[test]
 #[ignore = "docs/accuracy.md, by `cargo xtask accuracy`: false assumptions"]
 fn false_assumptions() {
-    let (first, rigs) = (count("FIRST", 6200), count("RIGS", 5).min(5) as usize);
+    let (first, rigs) = (count("FIRST", 6400), count("RIGS", 5).min(5) as usize);
     let only = count("ROW", u64::MAX);
     let wanted: Vec<(usize, usize)> = (0..FALSE.len())
         .filter(|row| only == u64::MAX || *row as u64 == only)

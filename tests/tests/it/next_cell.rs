@@ -105,7 +105,7 @@ fn compared(rig: u64, folder: &Path, wanted: u32) -> (f64, f64, f64, f64) {
     let begun = Instant::now();
     let (address, plan) = simulated(rig, folder);
     let fixed = folder.join(format!("{rig}-fixed.jrig"));
-    let all = plan.replace("wanted = 3", &format!("wanted = {wanted}")).replace("most = 12", "most = 60");
+    let all = plan.replace("wanted = 6", &format!("wanted = {wanted}")).replace("most = 12", "most = 60");
     run(&fixed, &all, address.open(rig).unwrap());
     let until = outlook_of(&fixed).half_width();
     let (text, file) = (folder.join(format!("{rig}-plan.toml")), folder.join(format!("{rig}-until.jrig")));

@@ -21,7 +21,7 @@ fn signs(config: &RigConfig, seed: u64, reversed: Option<&str>) -> BTreeMap<Stri
     for (old, new) in [
         // of the responses one on specimen A and those on B
         ("\"C1\", \"C2\", \"C3\", \"C4\", \"D1\", \"D2\", \"D3\"", "\"C1\""),
-        ("wanted = 3", "wanted = 1"),
+        ("wanted = 6", "wanted = 1"),
         ("minimum = 2", "minimum = 1"),
     ] {
         assert!(plan.contains(old), "{old}");

@@ -13,7 +13,7 @@ fn every_second_cell_of_an_impact_begins_with_the_softer_force() {
     let (_, geometry) = rest.split_once("# Grouping").unwrap();
     let cells = "[[configuration]]\nname = \"AJB\"\nimpacts = [\"AZ1\", \"AZ3\"]\nresponses = [\"C1\", \"C3\", \"B1\"]\n\n";
     let plan = format!("{head}{cells}# Grouping{geometry}")
-        .replace("wanted = 3", "wanted = 2")
+        .replace("wanted = 6", "wanted = 2")
         .replace("length_s = 2.0", "length_s = 1.0")
         .replace("exponential_per_s = 2.3", "exponential_per_s = 4.6");
     let folder = tempfile::tempdir().unwrap();

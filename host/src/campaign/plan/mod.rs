@@ -29,7 +29,7 @@ mod structure;
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
 /// All cells of the paper's campaign and those on the specimen, three good hits in each.
 pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
-/// The minimum for the contact's own stiffness: 68 cells of three hits.
+/// The minimum for the contact's own stiffness: 58 cells of six hits.
 pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
 /// The paper's campaign and the cells on the specimen: yields both stiffnesses.
 pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
