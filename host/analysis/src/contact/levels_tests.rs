@@ -257,6 +257,30 @@ fn a_hammer_that_was_tilted_on_the_mass_is_inside_the_interval() {
 }
 
 #[test]
+fn cells_on_the_mass_that_were_aimed_one_by_one_do_not_count() {
+    // every second cell on the mass was hit 1 mm beside the others; only one impact is on the mass,
+    // so that nothing shows what that changes
+    let straight = measured(&World::new(0.0, 1e-7), SIGMA_PER_S);
+    let mixed: Vec<Cell> = (measured(&World::new(0.0, 1e-7), SIGMA_PER_S).into_iter())
+        .zip(measured(&World::new(1e-3, 1e-7), SIGMA_PER_S))
+        .map(|(straight, aside)| if straight.point % 2 == 0 { straight } else { aside })
+        .collect();
+    let found = |cells: &[Cell], aim_m: f64, shared: bool| {
+        let mut input = input(cells, 0.0);
+        input.priors.positions.aim_m = aim_m;
+        if shared {
+            input.cells.iter_mut().for_each(|cell| cell.records = &[1, 2]);
+        }
+        stiffness(&input).expect("all is there").k_t_n_per_m.mean
+    };
+    let aim_m = 2e-4;
+    assert_eq!(found(&straight, aim_m, false), found(&mixed, aim_m, false));
+    // they count where there is no error of aim, or where all signals are from the same hits
+    assert_ne!(found(&straight, 0.0, false), found(&mixed, 0.0, false));
+    assert_ne!(found(&straight, aim_m, true), found(&mixed, aim_m, true));
+}
+
+#[test]
 fn what_a_level_lacks_is_named() {
     let world = World::new(0.0, 2e-9);
     let (heavy, light) = (measured(&world, SIGMA_PER_S), measured(&world, LIGHT_PER_S));
