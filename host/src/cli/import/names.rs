@@ -356,14 +356,15 @@ mod tests {
 
     #[test]
     fn a_pattern_finds_the_plans_names_in_a_files_name() {
-        let plan = Plan::parse(CONTACT, "contact.toml").expect("a plan");
+        // with an impact whose name has the separator in it
+        let with_mass = CONTACT.replace("\"AZ3\"]", "\"AZ3\", \"I_MZ\"]");
+        let plan = Plan::parse(&with_mass, "contact.toml").expect("a plan");
         let found = |pattern: &str, stem: &str| {
             let pattern: Pattern = pattern.parse().expect("a pattern");
             let cell = pattern.cell(stem, &plan, Some("B"))?;
             Some(format!("{}/{}/{}", configuration_name(cell.configuration), cell.impact, cell.response))
         };
         let whole = "{configuration}_{impact}_{response}_{hit}";
-        // a name with the separator in it
         assert_eq!(found(whole, "AJB_I_MZ_C3_017").as_deref(), Some("AJB/I_MZ/C3"));
         assert_eq!(found(whole, "AJB_I_MZ_C3"), None);
         assert_eq!(found(whole, "AJB_I_MZ_S9_1"), None);
