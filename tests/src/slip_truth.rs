@@ -20,7 +20,7 @@ pub struct Slid {
     pub path: f64,
 }
 
-/// One hit at each impact point along z.
+/// One hit at each impact point along z of `contact.toml`.
 pub fn slid(campaign: &DrawnCampaign) -> Vec<Slid> {
     let config = campaign.rig();
     let k = config.contact.stiffness_n_per_m[2];
@@ -39,5 +39,5 @@ pub fn slid(campaign: &DrawnCampaign) -> Vec<Slid> {
         }
         Slid { part, path }
     };
-    ["AZ1", "AZ2", "AZ3", "I_MZ"].map(&mut hit).to_vec()
+    ["AZ1", "AZ2", "AZ3"].map(&mut hit).to_vec()
 }
