@@ -63,32 +63,39 @@ pub struct Shaker {
     /// Shortest record in steady state, s; at least twenty cycles.
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
     seconds: f64,
+    #[command(flatten)]
+    shaking: ShakingArgs,
+}
+
+/// Options of every command that moves the shaker.
+#[derive(Debug, Args)]
+pub struct ShakingArgs {
     /// The drive's largest amplitude, V [default: its full scale].
     #[arg(long, value_name = "V", value_parser = positive)]
-    max_drive: Option<f64>,
+    pub max_drive: Option<f64>,
     /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale for load
     /// cells and excitation]; may be repeated.
     #[arg(long = "limit", value_name = "CHANNEL=VALUE", value_parser = limit)]
-    limits: Vec<(String, f64)>,
+    pub limits: Vec<(String, f64)>,
     /// Answer every prompt with yes.
     #[arg(long)]
-    yes: bool,
+    pub yes: bool,
     /// Continue even if the device indicates another structure than that of the file's records; the
     /// report notes it.
     #[arg(long)]
-    new_structure: bool,
+    pub new_structure: bool,
     /// Print the results as one JSON document.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
     /// Seed of a simulated rig.
     #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    pub seed: u64,
     /// Folder with the tables that decode the controller's log lines [default: that of the
     /// environment variable JOINTRIG_LOG_TABLES].
     #[arg(long, value_name = "DIR")]
-    log_tables: Option<PathBuf>,
+    pub log_tables: Option<PathBuf>,
     #[command(flatten)]
-    page: crate::cli::page::Page,
+    pub page: crate::cli::page::Page,
 }
 
 impl Shaker {
@@ -96,7 +103,7 @@ impl Shaker {
         let address: Address = self.device.parse()?;
         let mut store = Store::open(&self.file)?;
         let stop = Arc::default();
-        let mut onlooker = self.page.start(Some(&self.file), &stop, false)?;
+        let mut onlooker = self.shaking.page.start(Some(&self.file), &stop, false)?;
         let plan = store.plan()?;
         let levels = self.levels(&plan)?;
         let moment = match self.when {
@@ -104,13 +111,15 @@ impl Shaker {
             None if store.records()?.is_empty() => Moment::Before,
             None => Moment::After,
         };
-        let mut session =
-            Session::open(address.open_worn(self.seed, store.wear_total()?.energy_j)?, &address.to_string())?;
-        session.look_for_log_tables(Tables::new(self.log_tables.clone()));
+        let mut session = Session::open(
+            address.open_worn(self.shaking.seed, store.wear_total()?.energy_j)?,
+            &address.to_string(),
+        )?;
+        session.look_for_log_tables(Tables::new(self.shaking.log_tables.clone()));
         onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
         let info = session.info()?;
         if info.drive_v > 0.0 && !info.stage {
-            ready(self.yes, &format!("{} levels of the shaker", levels.len()))?;
+            ready(self.shaking.yes, &format!("{} levels of the shaker", levels.len()))?;
         }
         output::catch(&stop, "shot");
         tell_line!("{} levels, {} the hammer's cells; {CRITERION}", levels.len(), moment.name());
@@ -119,9 +128,9 @@ impl Shaker {
             moment,
             seconds: self.seconds,
             sweep_hz_per_s: self.rate,
-            most_drive_v: self.max_drive,
-            limits: ChannelLimits(self.limits.clone()),
-            new_structure: self.new_structure,
+            most_drive_v: self.shaking.max_drive,
+            limits: ChannelLimits(self.shaking.limits.clone()),
+            new_structure: self.shaking.new_structure,
             stop,
         };
         let onlookers = Onlookers { watch: onlooker.watch.clone(), edits: onlooker.edits.take() };
@@ -146,7 +155,7 @@ impl Shaker {
         }
         let summary = summary?;
         store.close()?;
-        if self.json {
+        if self.shaking.json {
             output::json(&json!({
                 "file": self.file.display().to_string(),
                 "when": moment.name(),
@@ -316,7 +325,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     if ends[0] == ends[1] { Err(wrong.into()) } else { Ok(ends) }
 }
 
-pub(super) fn limit(text: &str) -> Result<(String, f64), String> {
+fn limit(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("write CHANNEL=VALUE")?;
     Ok((name.to_owned(), positive(value)?))
 }

@@ -3,7 +3,7 @@
 use super::error::CliError;
 use super::output;
 use super::output::positive;
-use super::shaker::{limit, ready};
+use super::shaker::{ShakingArgs, ready};
 use crate::advice;
 use crate::analyse::wear::wear;
 use crate::campaign::plan::{Plan, WearPlan};
@@ -51,32 +51,8 @@ pub struct Wear {
     /// plan].
     #[arg(long, value_name = "J", value_parser = positive)]
     energy: Option<f64>,
-    /// The drive's largest amplitude, V [default: its full scale].
-    #[arg(long, value_name = "V", value_parser = positive)]
-    max_drive: Option<f64>,
-    /// Magnitude of a channel (SI) that stops the shaker [default: 95 % of full scale for load
-    /// cells and excitation]; may be repeated.
-    #[arg(long = "limit", value_name = "CHANNEL=VALUE", value_parser = limit)]
-    limits: Vec<(String, f64)>,
-    /// Answer every prompt with yes.
-    #[arg(long)]
-    yes: bool,
-    /// Continue even if the device indicates another structure than that of the file's records; the
-    /// report notes it.
-    #[arg(long)]
-    new_structure: bool,
-    /// Print the results as one JSON document.
-    #[arg(long)]
-    json: bool,
-    /// Seed of a simulated rig.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Folder with the tables that decode the controller's log lines [default: that of the
-    /// environment variable JOINTRIG_LOG_TABLES].
-    #[arg(long, value_name = "DIR")]
-    log_tables: Option<PathBuf>,
     #[command(flatten)]
-    page: crate::cli::page::Page,
+    shaking: ShakingArgs,
 }
 
 impl Wear {
@@ -87,16 +63,16 @@ impl Wear {
         let plan = store.plan()?;
         let wanted = self.wanted(&plan)?;
         let stop = Arc::default();
-        let mut onlooker = self.page.start(Some(&self.file), &stop, false)?;
+        let mut onlooker = self.shaking.page.start(Some(&self.file), &stop, false)?;
         let before = store.wear_total()?;
-        let transport = address.open_worn(self.seed, before.energy_j)?;
+        let transport = address.open_worn(self.shaking.seed, before.energy_j)?;
         let mut session = Session::open(transport, &address.to_string())?;
-        session.look_for_log_tables(Tables::new(self.log_tables.clone()));
+        session.look_for_log_tables(Tables::new(self.shaking.log_tables.clone()));
         onlooker.tap.take().into_iter().for_each(|tap| session.watch(tap));
         let info = session.info()?;
         if info.drive_v > 0.0 && !info.stage {
             ready(
-                self.yes,
+                self.shaking.yes,
                 &format!("a wear run of {} cycles", count(wanted.cycles.saturating_sub(before.cycles))),
             )?;
         }
@@ -112,9 +88,9 @@ impl Wear {
         let options = WearOptions {
             run: wanted,
             normal_load_n: plan.contact.as_ref().and_then(|own| own.get_ref().normal_load_n),
-            most_drive_v: self.max_drive,
-            limits: ChannelLimits(self.limits.clone()),
-            new_structure: self.new_structure,
+            most_drive_v: self.shaking.max_drive,
+            limits: ChannelLimits(self.shaking.limits.clone()),
+            new_structure: self.shaking.new_structure,
             stop,
         };
         let onlookers = Onlookers { watch: onlooker.watch.clone(), edits: onlooker.edits.take() };
@@ -156,7 +132,7 @@ impl Wear {
     }
 
     fn print(&self, found: Option<&WearRuns>, summary: Option<&WearSummary>) -> Result<(), CliError> {
-        if self.json {
+        if self.shaking.json {
             return output::json(&json!({
                 "file": self.file.display().to_string(),
                 "end": summary.map(|summary| summary.end.name()),
