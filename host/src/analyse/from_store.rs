@@ -208,7 +208,7 @@ const FEWEST_BEFORE: usize = 128;
 /// hit before, too slowly for the wait between hits to notice. Either begins with the record, as a
 /// step, whose spectrum falls with frequency like that of a free body: a sway of 3 % of the
 /// velocity after the hit changes single lines of its FRF by 4 %.
-fn before_the_hit(samples: ChannelView<'_>, start: usize) -> f64 {
+pub fn before_the_hit(samples: ChannelView<'_>, start: usize) -> f64 {
     let before = samples.part(0, start);
     if before.len() < FEWEST_BEFORE { 0.0 } else { before.mean().unwrap_or(0.0) }
 }

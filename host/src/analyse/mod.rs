@@ -52,7 +52,7 @@ pub use findings::{ConfigurationFindings, Findings, ImportedFrom, Settings};
 pub use from_frfs::{Fit, NoFit, fits};
 pub use from_frfs::{Row, Substructured};
 pub use from_store::AnalyseError;
-pub use from_store::{AnalysedLength, CampaignFile, analyse};
+pub use from_store::{AnalysedLength, CampaignFile, analyse, before_the_hit};
 pub use impact_loops::{ImpactLoops, SlopeIs};
 pub use missing::Missing;
 pub use modal::{FRF_ERROR, FoundModes, MODES_HZ, NoModes};

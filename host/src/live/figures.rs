@@ -3,11 +3,12 @@
 //! FRF of its cell. The spectra come from single hits, read one at a time, and each only once.
 
 use super::now::Shaker;
-use crate::analyse::{AnalysedLength, LINES_HZ, places};
+use crate::analyse::{AnalysedLength, LINES_HZ, before_the_hit, places};
 use crate::campaign::plan::{Cell as PlanCell, Plan};
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::campaign::store::record_table::RecordRow;
+use crate::device::samples::ChannelView;
 use crate::report;
 use crate::report::cell_records::{Shown, close};
 use crate::report::figure::{Along, Axis, Figure, Height, Mark, Packed, Panel, Role, Shape, Spread};
@@ -369,10 +370,14 @@ pub fn of_hit(store: &Store, plan: &Plan, cell: i64, row: &RecordRow) -> Result<
     let cut = |signal: &[f64]| -> Vec<f64> {
         signal[analysed.start.min(signal.len())..analysed.end.min(signal.len())].to_vec()
     };
+    let by_the_hit = |signal: &Vec<f64>| -> Vec<f64> {
+        let before = before_the_hit(ChannelView::F64(signal), analysed.start);
+        cut(signal).into_iter().map(|value| value - before).collect()
+    };
     let records = ImpactRecords {
         fs_hz: shown.rate_hz,
         force_n: vec![cut(&shown.force_n)],
-        response: vec![shown.response.iter().map(|signal| cut(signal)).collect()],
+        response: vec![shown.response.iter().map(by_the_hit).collect()],
         quantity,
     };
     let delay = |place: usize| f64::from(channels.channels[place].delay_ns) * 1e-9;
