@@ -431,7 +431,9 @@ impl CampaignFile {
             }
             let write = |signal: &mut Vec<f64>| {
                 map.si_into(place, samples, signal);
-                signal.iter_mut().for_each(|value| *value -= units * before);
+                for value in signal {
+                    *value -= units * before;
+                }
             };
             for (signal, _) in hit.response.iter_mut().zip(&responses).filter(|(_, own)| **own == place) {
                 write(signal);

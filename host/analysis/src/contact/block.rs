@@ -403,7 +403,9 @@ fn count_known_aims(blocks: &mut [Block], aim_m: f64) {
     }
     let assembled = |block: &Block| block.along_z.is_none();
     if !blocks.iter().any(|block| assembled(block) && block.counts) {
-        blocks.iter_mut().for_each(|block| block.counts = true);
+        for block in blocks {
+            block.counts = true;
+        }
     }
 }
 
