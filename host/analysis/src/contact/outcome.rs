@@ -11,7 +11,7 @@
 
 use super::block::Block;
 use super::contradictions::{self, Changes, Contradiction, Worst};
-use super::parameters::{COMPLIANCE, Cause, FORM, HAMMER, Parameters, RETARDATION};
+use super::parameters::{COMPLIANCE, Cause, FORM, HAMMER, MASS_ERROR, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
 use super::{ContactError, Fit, Input};
 use crate::band::Band;
@@ -79,7 +79,16 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
     slopes[RETARDATION] = k;
     let of_damping = (covariance * &slopes).dot(&slopes);
     let balance = force_balance(input, fit, misfit);
-    let false_scale = balance.as_ref().map(|one| one.off[0][0].abs());
+    let contradictions: Vec<Contradiction> = changes.contradictions(fit).into_iter().chain(balance).collect();
+    // on the known mass, an error of its weight looks like one of the hammer or of all vibrometers,
+    // which k_T is in proportion to: the interval contains both
+    let scale = |one: &Contradiction| match (one.what.as_str(), one.off.first()?) {
+        (FORCE_BALANCE, [off, _]) => Some(off.abs()),
+        // the logarithm of a ratio
+        (MASS_ERROR, [off, sigma]) => Some((off.abs() + NORMAL_95 * sigma).exp_m1()),
+        _ => None,
+    };
+    let false_scale = contradictions.iter().filter_map(scale).reduce(f64::max);
     let of_scale = (false_scale.unwrap_or(0.0) / NORMAL_95 * beta * k).powi(2);
     let spread = NORMAL_95 * (of_damping.max(0.0) * misfit + of_scale).sqrt();
     let c_t = Interval { mean: beta * k, ci95: [beta * k - spread, beta * k + spread] };
@@ -101,7 +110,7 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
         budget,
         includes_specimen_b: input.includes_specimen_b(),
         of_frequency: of_frequency(blocks, solution, compliance),
-        contradictions: changes.contradictions(fit).into_iter().chain(balance).collect(),
+        contradictions,
         doubts,
         diagnosis,
         chi_square: solution.chi_square,

@@ -320,6 +320,14 @@ fn a_known_mass_shows_a_hammer_that_is_off() {
     assert_eq!(found.contradictions[0].what, HAMMER_GAIN);
     let [off, sigma] = found.contradictions[0].off[0];
     assert!((off - 0.05).abs() < 3.0 * sigma && sigma < 6e-3, "{off} {sigma}");
+    // stated as exact, hammer and vibrometers leave only the mass to be off: k_T is then in
+    // proportion to either, and its interval contains both values
+    let mut exact = input(&cells);
+    exact.known_mass = of_hammer.known_mass;
+    let either = stiffness(&exact).expect("all is there");
+    let [low, high] = either.k_t_n_per_m.ci95;
+    assert!(low < K && K < high && low < without.mean && without.mean < high, "{either:?}");
+    assert!(either.contradictions.iter().any(|one| one.what == MASS_ERROR), "{either:?}");
     // what is right is confirmed, and the interval is narrower than without the mass
     let cells = measured(World { noise_m_per_s: 1e-7, ..QUIET });
     let mut right = input(&cells);

@@ -136,9 +136,10 @@ fn of_contradiction(one: &Contradiction) -> String {
             "On the known mass {} seems off by {off}, or all vibrometers together: calibrate them again. k_T allows for it.",
             one.what
         ),
-        Cause::Gains if one.what == MASS_ERROR => {
-            format!("{name} seems off by {off}: weigh it again, and strike it in the middle.")
-        }
+        Cause::Gains if one.what == MASS_ERROR => format!(
+            "On the known mass the hammer's force and all vibrometers contradict each other by {off}: calibrate the hammer's force cell and the \
+             vibrometers again, weigh the mass, and strike it in the middle. Which of them is off cannot be told."
+        ),
         Cause::Gains => format!("{name} seems off by {off}: calibrate it again."),
         Cause::Drift => format!(
             "The contact changed between the first and the last hits on A: T over the displacement between the spots changed by {off}. Look for wear, for a \
