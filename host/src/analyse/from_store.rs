@@ -197,8 +197,8 @@ impl AnalysedLength {
     }
 }
 
-/// Fewest samples before the analysed part of a record whose mean is subtracted from it: the mean of
-/// fewer adds more than a tenth to the noise at 100 Hz.
+/// Fewest samples before the analysed part of a record whose mean is subtracted from it: the mean
+/// of fewer adds more than a tenth to the noise at 100 Hz.
 const FEWEST_BEFORE: usize = 128;
 
 /// What a sensor shows before a hit, in the samples' own unit: the mean of the samples before

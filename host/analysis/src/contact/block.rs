@@ -393,9 +393,9 @@ pub fn blocks(input: &Input<'_>, parameters: &mut Parameters) -> Result<Vec<Bloc
     Ok(all)
 }
 
-/// Decides which blocks of the assembly count. On entry [`Block::counts`] says whether impacts on the
-/// same body show what a shift of the impact changes. Without any error of aim, or with all signals
-/// from the same hits, it does not matter; where no block would count, all do.
+/// Decides which blocks of the assembly count. On entry [`Block::counts`] says whether impacts on
+/// the same body show what a shift of the impact changes. Without any error of aim, or with all
+/// signals from the same hits, it does not matter; where no block would count, all do.
 fn count_known_aims(blocks: &mut [Block], aim_m: f64) {
     for block in blocks.iter_mut() {
         let same_hits = block.cells.iter().skip(1).all(|cell| cell.first.is_some());
