@@ -535,8 +535,8 @@ impl Normal {
         }
     }
 
-    /// Adds one line; returns the best-fitting motion and its residual. None if the rows do not
-    /// determine the motion.
+    /// Adds one line of a block that counts; returns the best-fitting motion and its residual. None
+    /// if the rows do not determine the motion.
     pub fn add(
         &mut self,
         block: &Block,
@@ -550,16 +550,19 @@ impl Normal {
         let rows = map.nrows();
         let Eliminated { q, motion, residual, .. } = eliminated(block, line, &map, &offsets, p, shifts)?;
 
+        let left_of_rows: Vec<(C, f64)> =
+            (0..rows).map(|r| (residual[r], 1.0 - q.row(r).norm_squared())).collect();
+        if !block.counts {
+            return Some((motion, Residual { line: index, rows: left_of_rows }));
+        }
         self.chi_square += residual.norm_squared();
         self.freedom += (rows - map.ncols()) as f64;
-        let mut left_of_rows = Vec::with_capacity(rows);
         for (r, row) in block.rows.iter().enumerate() {
             let kind = if row.channel < 3 { row.channel } else { 3 + block.cells[row.cell].group as usize };
-            let (left, free) = (residual[r].norm_sqr(), 1.0 - q.row(r).norm_squared());
+            let (left, free) = left_of_rows[r];
             // compared with the noise alone, without the allowance for unexplained signal
-            self.kinds[kind][0] += left * (line.weight[r] * line.sigma[r]).powi(-2);
+            self.kinds[kind][0] += left.norm_sqr() * (line.weight[r] * line.sigma[r]).powi(-2);
             self.kinds[kind][1] += free;
-            left_of_rows.push((residual[r], free));
             self.kinds[kind][2] += (line.value[r] / line.sigma[r]).norm_sqr();
         }
         self.add_derivatives(&model.derivatives(&motion, shifts, &map), &line.weight, &q, &residual);
@@ -570,6 +573,9 @@ impl Normal {
     /// from noisy signals, which enlarges products with it. Adds nothing if the rows do not
     /// determine the motion.
     pub fn add_of_noise(&mut self, block: &Block, line: usize, p: &[f64]) {
+        if !block.counts {
+            return;
+        }
         let line = &block.lines[line];
         let model = LineModel::new(block, p, line.s).of_motion();
         let (map, _) = model.map();

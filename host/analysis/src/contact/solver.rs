@@ -396,7 +396,7 @@ pub fn certainty(
 pub fn of_noise(blocks: &[Block], bin: &Bin, p: &[f64]) -> Normal {
     let block = &blocks[bin.block];
     let mut normal = Normal::none(block.parameters.len());
-    for residual in bin.residuals.iter().filter(|_| block.counts) {
+    for residual in &bin.residuals {
         normal.add_of_noise(block, residual.line, p);
     }
     normal
@@ -459,9 +459,6 @@ fn bin(
         motion.push(moved);
         residuals.push(residual);
     }
-    if !block.counts {
-        normal = Normal::none(block.parameters.len());
-    }
     Some(Bin { block: b, low_hz, normal, residuals, motion })
 }
 
@@ -485,7 +482,7 @@ fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Comple
 /// the motion.
 pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
     let mut normal = Normal::none(block.parameters.len());
-    for line in (0..block.lines.len()).filter(|_| block.counts) {
+    for line in 0..block.lines.len() {
         normal.add(block, line, p, shifts(block, motion, line).as_ref())?;
     }
     Some(normal.information / shared)
@@ -582,7 +579,8 @@ pub fn latent(blocks: &[Block], bins: &[Bin]) -> Vec<Vec<[f64; 2]>> {
         })
         .collect();
     let pooled = |alone: bool, instrument: usize| {
-        let own = (blocks.iter().zip(&seen)).filter(|(block, _)| block.along_z.is_some() == alone);
+        let own =
+            (blocks.iter().zip(&seen)).filter(|(block, _)| block.counts && block.along_z.is_some() == alone);
         let rows: Vec<Seen> = own
             .flat_map(|(block, seen)| block.cells.iter().zip(seen))
             .filter(|(cell, _)| cell.unexplained[instrument] == 0.0)
