@@ -72,6 +72,8 @@ pub struct Rig {
     flaws: Flaws,
     plants: [Plant; 3],
     known_mass: Option<Plant>,
+    /// The assembly with its joint open.
+    open: Option<(Box<RigConfig>, Plant)>,
     stepping: Stepping,
     configuration: Configuration,
     impact: String,
@@ -131,6 +133,14 @@ impl Rig {
             .as_ref()
             .map(|mass| Plant::of_known_mass(mass, config, stepping, period_s))
             .transpose()?;
+        let open = match &config.open_joint {
+            Some(_) => {
+                let opened = Box::new(config.opened());
+                let plant = Plant::new(&opened, Configuration::Ajb, stepping, period_s)?;
+                Some((opened, plant))
+            }
+            None => None,
+        };
         let ten = channels::channels(&config.sensors);
         let flaws = Flaws::new(seed, config, &ten);
         let sensors = Sensors::new(config, &ten, &flaws, None, stream(seed, &["at rest"]));
@@ -148,6 +158,7 @@ impl Rig {
             period_s,
             plants,
             known_mass,
+            open,
             configuration,
             impact: impact.name.clone(),
             response: response.name.clone(),
@@ -252,6 +263,13 @@ impl Rig {
         if hit.body != seen.body && on_known_mass {
             return Err(RigError::ApartFromKnownMass { impact: impact.into(), response: response.into() });
         }
+        let opens = self
+            .config
+            .open_joint_in(configuration)
+            .map_or([false; 2], |open| [open.impact.name == impact, open.response.name == response]);
+        if opens[0] != opens[1] {
+            return Err(RigError::HalfOpen { impact: impact.into(), response: response.into() });
+        }
         let mark = self.config.spots.mark.as_ref();
         let at_mark = configuration == Configuration::B
             && (on_known_mass || mark.is_some_and(|mark| mark.name == response));
@@ -260,14 +278,15 @@ impl Rig {
         let worn_j = self.worn_j();
         let drifted_to = (self.total_hits, self.total_scans);
         let changes = self.config.contact.drifts() || self.config.contact.wear.is_some();
-        let changed = (configuration == Configuration::Ajb && changes)
+        let open = self.open.as_ref().filter(|_| opens[0]);
+        let changed = (configuration == Configuration::Ajb && changes && open.is_none())
             .then(|| Box::new(self.config_after(drifted_to, worn_j)));
-        let config = changed.as_deref().unwrap_or(&self.config);
+        let config = changed.as_deref().or(open.map(|(config, _)| &**config)).unwrap_or(&self.config);
         let fresh = match &changed {
             Some(config) => Some(Plant::new(config, configuration, self.stepping, self.period_s)?),
             None => None,
         };
-        let own = self.known_mass.as_ref().filter(|_| on_known_mass);
+        let own = self.known_mass.as_ref().filter(|_| on_known_mass).or(open.map(|(_, plant)| plant));
         let plant = fresh.as_ref().or(own).unwrap_or(&self.plants[configuration as usize]);
         let (stepper, slipping) = plant.aimed(config, &self.flaws, &aim, &self.channels)?;
         self.direct = plant.direct(config, &self.flaws, &aim);
@@ -435,7 +454,8 @@ impl Rig {
 
     /// The rig with its contact as it is now.
     fn current(&self) -> &RigConfig {
-        self.changed.as_deref().unwrap_or(&self.config)
+        let open = self.open().map(|(config, _)| &**config);
+        self.changed.as_deref().or(open).unwrap_or(&self.config)
     }
 
     /// The rig after its contact has drifted for these hits and scans, and dissipated this energy.
@@ -515,10 +535,18 @@ impl Rig {
         self.last_hit.as_ref()
     }
 
-    /// What is stepped: the known mass if it is struck, else the staged configuration.
+    /// The assembly with its joint open, if that is staged.
+    fn open(&self) -> Option<&(Box<RigConfig>, Plant)> {
+        let of_impact = self.config.open_joint_in(self.configuration).map(|open| &open.impact.name);
+        self.open.as_ref().filter(|_| of_impact == Some(&self.impact))
+    }
+
+    /// What is stepped: the known mass if it is struck, the assembly with its joint open, else the
+    /// staged configuration.
     fn plant(&self) -> &Plant {
         let known_mass = self.known_mass.as_ref().filter(|_| self.aim.impact.body == BodyName::KnownMass);
-        known_mass.unwrap_or(&self.plants[self.configuration as usize])
+        let open = self.open().map(|(_, plant)| plant);
+        known_mass.or(open).unwrap_or(&self.plants[self.configuration as usize])
     }
 
     /// Energy that the contact's friction has dissipated in the rig's life (J): what a contact that
@@ -577,6 +605,16 @@ pub enum RigError {
         "impact {impact} and response {response} are not both on the known mass, which is connected to nothing: move both there, or neither"
     )]
     ApartFromKnownMass {
+        /// The impact.
+        impact: String,
+        /// The response.
+        response: String,
+    },
+    /// One of hammer and vibrometer is to be at its point of the open joint, the other not.
+    #[error(
+        "impact {impact} and response {response}: only one of them is a point of the open joint; the joint is either open or closed"
+    )]
+    HalfOpen {
         /// The impact.
         impact: String,
         /// The response.

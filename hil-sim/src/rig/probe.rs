@@ -69,9 +69,10 @@ impl RigConfig {
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
         let of_mass = || self.known_mass_in(configuration).map(|mass| &mass.response);
+        let of_open = || self.open_joint_in(configuration).map(|open| &open.response);
         let there = || {
             let own = self.response_points().filter(|point| self.has(configuration, point.body));
-            own.chain(of_mass())
+            own.chain(of_mass()).chain(of_open())
         };
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "response",
@@ -87,8 +88,11 @@ impl RigConfig {
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
         let of_mass = || self.known_mass_in(configuration).map(|mass| &mass.impact);
-        let there =
-            || self.impacts.iter().filter(|point| self.has(configuration, point.body)).chain(of_mass());
+        let of_open = || self.open_joint_in(configuration).map(|open| &open.impact);
+        let there = || {
+            let own = self.impacts.iter().filter(|point| self.has(configuration, point.body));
+            own.chain(of_mass()).chain(of_open())
+        };
         there().find(|point| point.name == name).ok_or_else(|| RigError::UnknownPoint {
             kind: "impact",
             name: name.to_owned(),

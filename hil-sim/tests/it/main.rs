@@ -13,6 +13,7 @@ mod frf;
 mod hammer;
 mod impact_record;
 mod known_mass;
+mod open_joint;
 mod own_structure;
 mod records;
 mod reference;

@@ -3,11 +3,11 @@
 //! nothing) are checked. Each error names the field, and its line in the text.
 
 use super::{
-    Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, KnownMass, OwnBody, OwnStructure, RigConfig,
-    RigidBody, Side, Spring,
+    Beam, BodyName, Bushing, ContactLaw, DEFAULT_TOML, ImpactPoint, KnownMass, OpenJoint, OwnBody,
+    OwnStructure, ResponsePoint, RigConfig, RigidBody, Side, Spring,
 };
-use crate::rig::RigError;
 use crate::rig::channels::{CHANNELS, FORCE, channels};
+use crate::rig::{Configuration, RigError};
 use jointrig_protocol::channel::{NARROW_BITS, WIDE_BITS};
 use jointrig_protocol::limits::MAX_CHANNELS;
 use nalgebra::Vector3;
@@ -57,6 +57,9 @@ pub fn check(config: &RigConfig) -> Result<(), RigError> {
     bushing("knife_edge", &config.knife_edge)?;
     if let Some(mass) = &config.known_mass {
         known_mass(mass)?;
+    }
+    if let Some(open) = &config.open_joint {
+        open_joint(config, open)?;
     }
     bushing("wire.bushing", &config.wire.bushing)?;
     bushing("push_rod_a.bushing", &config.push_rod_a.bushing)?;
@@ -293,19 +296,41 @@ pub fn normal_load(normal_load_n: f64) -> Result<(), RigError> {
 fn known_mass(mass: &KnownMass) -> Result<(), RigError> {
     body("known_mass.body", &mass.body)?;
     bushing("known_mass.foam", &mass.foam)?;
-    finite("known_mass.impact.position_m", &mass.impact.position_m)?;
-    finite("known_mass.response.position_m", &mass.response.position_m)?;
-    finite("known_mass.impact.direction", &mass.impact.direction)?;
-    if mass.impact.direction.iter().all(|d| *d == 0.0) {
-        return Err(bad(
-            "known_mass.impact.direction",
-            "must point somewhere: all three components are zero",
-        ));
-    }
+    struck_and_seen("known_mass", &mass.impact, &mass.response)?;
     for (field, body) in [("impact", mass.impact.body), ("response", mass.response.body)] {
         if body != BodyName::KnownMass {
             return Err(bad(&format!("known_mass.{field}.body"), "must be \"known_mass\""));
         }
+    }
+    Ok(())
+}
+
+fn open_joint(config: &RigConfig, open: &OpenJoint) -> Result<(), RigError> {
+    struck_and_seen("open_joint", &open.impact, &open.response)?;
+    for (field, body) in [("impact", open.impact.body), ("response", open.response.body)] {
+        if !config.has(Configuration::A, body) {
+            return Err(bad(&format!("open_joint.{field}.body"), "must be on side A"));
+        }
+    }
+    let named = |name: &str| config.impacts.iter().any(|own| own.name == name);
+    if named(&open.impact.name) {
+        return Err(bad("open_joint.impact.name", "is the name of one of the impacts"));
+    }
+    if config.response_points().any(|own| own.name == open.response.name) {
+        return Err(bad("open_joint.response.name", "is the name of one of the responses"));
+    }
+    Ok(())
+}
+
+fn struck_and_seen(table: &str, impact: &ImpactPoint, response: &ResponsePoint) -> Result<(), RigError> {
+    finite(&format!("{table}.impact.position_m"), &impact.position_m)?;
+    finite(&format!("{table}.response.position_m"), &response.position_m)?;
+    finite(&format!("{table}.impact.direction"), &impact.direction)?;
+    if impact.direction.iter().all(|d| *d == 0.0) {
+        return Err(bad(
+            &format!("{table}.impact.direction"),
+            "must point somewhere: all three components are zero",
+        ));
     }
     Ok(())
 }
@@ -753,6 +778,10 @@ pub fn read(text: &str) -> Result<RigConfig, RigError> {
         let line = locate(user.get_ref(), field).map(|offset| line_of(text, offset));
         let reason = "describes the paper's rig, and [structure] another one: remove one of them".to_owned();
         return Err(RigError::Field { field: field.to_owned(), reason, line });
+    }
+    if user.get_ref().contains_key("structure") && !user.get_ref().contains_key("open_joint") {
+        // the default's points are on the paper's arm A
+        merged.get_mut().remove("open_joint");
     }
     // Only the user's text can be wrong here, so every span refers to it.
     let config = RigConfig::deserialize(toml::Deserializer::from(merged))

@@ -67,6 +67,9 @@ pub struct RigConfig {
     /// no such body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub known_mass: Option<KnownMass>,
+    /// Where arm A is struck and seen while the joint is open; none if it cannot be opened.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub open_joint: Option<OpenJoint>,
     /// The shaker.
     pub shaker: Shaker,
     /// The automatic hammer.
@@ -126,6 +129,23 @@ impl RigConfig {
     /// B is measured.
     pub(super) fn known_mass_in(&self, configuration: Configuration) -> Option<&KnownMass> {
         self.known_mass.as_ref().filter(|_| configuration == Configuration::B)
+    }
+
+    /// The points of the open joint, if hammer and vibrometer in `configuration` may be at them: it
+    /// is opened while both sides are in place.
+    pub(super) fn open_joint_in(&self, configuration: Configuration) -> Option<&OpenJoint> {
+        self.open_joint.as_ref().filter(|_| configuration == Configuration::Ajb)
+    }
+
+    /// The same rig with its joint open: the two sides are in place and do not touch.
+    pub(super) fn opened(&self) -> Self {
+        let contact = Contact {
+            law: ContactLaw::Linear,
+            stiffness_n_per_m: [0.0; 3],
+            rotation_nm_per_rad: [0.0; 3],
+            ..self.contact.clone()
+        };
+        RigConfig { contact, ..self.clone() }
     }
 
     /// The bodies that the contact joins: A's, then B's.
@@ -362,6 +382,17 @@ pub struct KnownMass {
     /// Where the hammer hits it.
     pub impact: ImpactPoint,
     /// Where the vibrometers measure it.
+    pub response: ResponsePoint,
+}
+
+/// Points of side A that are used while the joint is open: both sides are in place, as in the
+/// assembly, and the specimens do not touch. What then reaches side B passes beside the contact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OpenJoint {
+    /// Where the hammer hits.
+    pub impact: ImpactPoint,
+    /// Where the 3-D vibrometer measures.
     pub response: ResponsePoint,
 }
 
