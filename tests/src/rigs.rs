@@ -14,7 +14,7 @@ pub struct Drawn {
     pub stiffest_n_per_m: f64,
     /// Factor of the default errors of position, angle, skew and cross-talk.
     pub errors: f64,
-    /// Standard deviation of the gain of each load cell and vibrometer, relative.
+    /// Standard deviation of the gain of each load cell, each vibrometer and the hammer, relative.
     pub gain: f64,
     /// μN, N: contacts of even number slip as a whole beyond it (Jenkins), those of odd number have
     /// microslip below it (Iwan). `None`: no slip.
@@ -129,6 +129,7 @@ pub fn drawn(number: u64, drawn: Drawn) -> RigConfig {
         *error *= drawn.errors;
     }
     errors.gain = drawn.gain;
+    errors.hammer_gain = drawn.gain;
     if let Some(which) = drawn.elastic {
         rig = elastic(number, rig, which);
     }
@@ -260,9 +261,9 @@ pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
 /// sticks.
 pub fn levels_plan(rig: &RigConfig) -> String {
     let plan = contact_plan(rig);
-    let hits = "impacts = [\"AZ1\", \"AZ2\", \"AZ3\"]";
-    assert!(plan.contains(hits));
-    let where_it_pushes = plan.replace(hits, &hits.replace("\"AZ3\"", "\"AZ3\", \"I_MZ\""));
+    let last = "\"AZ3\"]";
+    assert!(plan.contains(last));
+    let where_it_pushes = plan.replace(last, "\"AZ3\", \"I_MZ\"]");
     format!("{where_it_pushes}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n")
 }
 
