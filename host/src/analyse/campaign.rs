@@ -12,7 +12,9 @@ use super::missing::{Missing, given_up};
 use super::modal::{FoundModes, MODES_HZ};
 use super::{
     cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode, known_mass,
+    open_joint,
 };
+use crate::contact::SecondPath;
 use crate::results::MAIN_BAND;
 use crate::spectra::Windowing;
 use crate::structure::Structure;
@@ -37,6 +39,10 @@ pub fn analyse_measurements<M: Measurements>(
     let mut missing = std::mem::take(&mut cells.missing);
     missing.extend(given_up(&names, measurements.given_up()));
     let known_mass = known_mass::compared(measurements).unwrap_or_else(|why| {
+        missing.push(why);
+        None
+    });
+    let second_path = open_joint::second_path(measurements).unwrap_or_else(|why| {
         missing.push(why);
         None
     });
@@ -129,6 +135,14 @@ pub fn analyse_measurements<M: Measurements>(
         }
         if let Some(joint) = &mut contact.joint {
             joint.allow_for(&drift);
+        }
+    }
+    if let Some(path) = second_path.filter(SecondPath::found) {
+        if let Ok(own) = &mut own_stiffness {
+            own.allow_for_path(&path);
+        }
+        if let Some(joint) = &mut contact.joint {
+            joint.allow_for_path(&path);
         }
     }
 

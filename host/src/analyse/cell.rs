@@ -112,6 +112,17 @@ pub struct MassCell {
     pub lasers: bool,
 }
 
+/// The cells that show what passes beside the contact: A is struck with the joint open, then closed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenJoint {
+    /// The cell with the joint open.
+    pub open: CellName,
+    /// The cell with the joint closed.
+    pub closed: CellName,
+    /// Index of each response's axis along the sliding direction.
+    pub axes: [usize; 2],
+}
+
 /// A level of the shaker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShakerLevel {
@@ -211,6 +222,12 @@ pub trait Measurements: Sync {
     /// The cell in which a free body of known mass is struck, if the plan has one. It is not one of
     /// [`Measurements::cells`].
     fn known_mass(&self) -> Option<MassCell> {
+        None
+    }
+
+    /// The cells that show what passes beside the contact, if the plan has them. The one with the
+    /// joint open is not one of [`Measurements::cells`].
+    fn open_joint(&self) -> Option<OpenJoint> {
         None
     }
 

@@ -6,8 +6,8 @@ use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
 use super::cell::{
-    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, Progress, SensorMass, ShakerLevel,
-    Wanted,
+    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, OpenJoint, Progress, SensorMass,
+    ShakerLevel, Wanted,
 };
 use super::chosen::DataQuality;
 use super::findings::Findings;
@@ -15,7 +15,7 @@ use super::missing::Missing;
 use super::modal::{FoundModes, NoModes};
 use super::plan_geometry::{geometry, places};
 use super::wear::wear;
-use crate::campaign::plan::{Plan, ResponsePoint, structure};
+use crate::campaign::plan::{OpenJointCells, Plan, ResponsePoint, structure};
 use crate::campaign::run::shaking;
 use crate::campaign::run::tally::Tally;
 use crate::campaign::store::Store;
@@ -490,9 +490,9 @@ impl Measurements for CampaignFile {
     }
 
     fn cells(&self) -> Vec<CellName> {
-        let on_mass = self.known_mass().map(|cell| cell.name);
+        let apart = [self.known_mass().map(|cell| cell.name), self.open_joint().map(|cells| cells.open)];
         let names = self.cells.iter().map(|c| &c.name);
-        names.filter(|name| on_mass.as_ref() != Some(*name)).cloned().collect()
+        names.filter(|name| !apart.iter().flatten().any(|own| own == *name)).cloned().collect()
     }
 
     fn session_of(&self, record: i64) -> Option<i64> {
@@ -555,6 +555,16 @@ impl Measurements for CampaignFile {
             axis: cell.axis,
             lasers: cell.lasers,
         })
+    }
+
+    fn open_joint(&self) -> Option<OpenJoint> {
+        let OpenJointCells { open, closed, axes } = self.plan.open_joint_cells()?;
+        let [open, closed] = [open, closed].map(|[impact, response]| CellName {
+            configuration: Structure::Ajb,
+            impact,
+            response,
+        });
+        Some(OpenJoint { open, closed, axes })
     }
 
     fn sensor_masses(&self) -> Vec<SensorMass> {

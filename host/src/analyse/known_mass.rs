@@ -1,7 +1,8 @@
 //! Compares hammer and vibrometers on the known mass.
 
-use super::averages::{Asked, CellSums, LINES_HZ};
+use super::averages::Asked;
 use super::cell::{MassCell, Measurements};
+use super::cells_stage::average;
 use super::missing::Missing;
 use crate::contact::{KnownMass, mass_ratio};
 use crate::spectra::MotionQuantity;
@@ -15,21 +16,9 @@ pub fn compared<M: Measurements>(measurements: &M) -> Result<Option<KnownMass>, 
     let Some(MassCell { name, mass_kg, sigma, axis, lasers }) = measurements.known_mass() else {
         return Ok(None);
     };
-    let records = |told: String| Missing::Records { cell: name.clone(), told };
-    let asked = Asked { contact: lasers, damped: false };
-    let mut sums = CellSums::new(name.clone(), measurements.sigma_per_s(), asked, LINES_HZ);
-    let (mut hits, mut unfit) = (0, None);
-    let read = measurements.each_hit(&name, lasers, &mut |hit, fs_hz| {
-        if unfit.is_none() {
-            unfit = sums.add(hit, fs_hz).err();
-            hits += 1;
-        }
-    });
-    read.map_err(|error| records(error.to_string()))?;
-    if hits == 0 {
+    let Some(average) = average(measurements, &name, Asked { contact: lasers, damped: false })? else {
         return Ok(None);
-    }
-    let average = unfit.map_or_else(|| sums.finish(), Err).map_err(|error| records(error.to_string()))?;
+    };
     let spot =
         |output: usize| mass_ratio(average.contact.as_ref()?, output, MotionQuantity::Velocity, mass_kg);
     let point = (axis < average.spectra.outputs())

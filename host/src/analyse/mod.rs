@@ -31,6 +31,7 @@ mod known_mass;
 mod missing;
 mod modal;
 pub mod next_cell;
+mod open_joint;
 mod plan_geometry;
 mod question;
 #[cfg(test)]

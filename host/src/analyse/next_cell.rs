@@ -10,11 +10,11 @@ use super::cell::{CellName, KnownContact, Measurements};
 use super::cells_stage::{Cells, drift_of_the_contact, read, slip_under_the_hammer};
 use super::contact_answer::{cells as contact_cells, input, reads};
 use super::from_store::{AnalyseError, CampaignFile};
-use super::known_mass;
+use super::{known_mass, open_joint};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::contact::{
-    Axes, Cause, ContactError, Doubt, Forecast, Interval, PlannedCell, Stiffness, forecast,
+    Axes, Cause, ContactError, Doubt, Forecast, Interval, PlannedCell, SecondPath, Stiffness, forecast,
 };
 use crate::structure::Structure;
 use rayon::prelude::*;
@@ -197,13 +197,17 @@ pub fn outlook(store: &Store, times: Times, averaged: &mut Averaged) -> Result<O
         .filter(|name| reads(geometry, name) && !file.is_fixed(&name.response) && open(name))
         .filter(|name| !all.averages.iter().any(|own| own.name == *name))
         .collect();
-    // if the hits on the known mass cannot be read, the analysis reports it, and the interval is
-    // that without them
+    // if the hits on the known mass or with the joint open cannot be read, the analysis reports it,
+    // and the interval is that without them
     let mass = known_mass::compared(&file).unwrap_or_default();
     let planned: Vec<PlannedCell<'_>> = without.iter().filter_map(|name| planned(&file, name)).collect();
     let (mut found, mut forecast) = forecast(&input(&file, cells, mass), &planned)?;
     if let Some(drift) = drift_of_the_contact(&all.at_contact).filter(|drift| drift.found() == Some(true)) {
         found.allow_for(&drift);
+        forecast.state(&found.k_t_n_per_m);
+    }
+    if let Some(path) = open_joint::second_path(&file).unwrap_or_default().filter(SecondPath::found) {
+        found.allow_for_path(&path);
         forecast.state(&found.k_t_n_per_m);
     }
     let Stiffness { k_t_n_per_m, doubts, .. } = found;
@@ -395,7 +399,7 @@ impl Outlook {
             .into_iter()
             .filter(|(cause, _)| *cause != Cause::Noise)
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let stated = !matches!(cause, Cause::Misfit | Cause::Drift);
+        let stated = !matches!(cause, Cause::Misfit | Cause::Drift | Cause::SecondPath);
         let half_width_if_halved = stated.then(|| self.forecast.half_width_with(cause, 0.5));
         Some(Dominating { cause, share, half_width_if_halved })
     }

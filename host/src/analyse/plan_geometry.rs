@@ -1,6 +1,6 @@
 //! The geometry of a plan.
 
-use crate::campaign::plan::{ConfigurationPlan, ON_KNOWN_MASS, Plan, turned};
+use crate::campaign::plan::{ConfigurationPlan, JOINT_OPEN, ON_KNOWN_MASS, Plan, turned};
 use crate::results::Place;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
@@ -63,7 +63,8 @@ fn in_coordinates(plan: &Plan, to_interface: &dyn Fn([f64; 3]) -> [f64; 3]) -> G
 }
 
 /// Positions of hammer and vibrometer on the structures according to the plan: responses, then
-/// impacts. The known mass stands beside them.
+/// impacts. The known mass stands beside them, and those of the open joint are not of the joined
+/// structure.
 pub fn places(plan: &Plan) -> Vec<Place> {
     let geometry = &plan.geometry;
     let responses = geometry.response.iter().map(toml::Spanned::get_ref).map(|p| Place {
@@ -80,5 +81,5 @@ pub fn places(plan: &Plan) -> Vec<Place> {
         position_m: p.position_m,
         direction: Some(p.direction),
     });
-    responses.chain(impacts).filter(|place| place.grouping != ON_KNOWN_MASS).collect()
+    responses.chain(impacts).filter(|place| ![ON_KNOWN_MASS, JOINT_OPEN].contains(&place.grouping)).collect()
 }

@@ -25,7 +25,7 @@
 use jointrig_protocol::channel::{Axis, Quantity, Role};
 use jointrig_protocol::request::Configuration;
 
-use super::plan::{ImpactPoint, ON_KNOWN_MASS, Plan, ResponsePoint, configuration_name};
+use super::plan::{ImpactPoint, JOINT_OPEN, ON_KNOWN_MASS, Plan, ResponsePoint, configuration_name};
 use super::store::Store;
 use super::store::error::StoreError;
 use super::store::record_table::RecordRow;
@@ -280,7 +280,9 @@ fn candidates<'a>(
             let looked_at = plan.response(&cell.response)?;
             let assembly = cell.configuration == Configuration::Ajb;
             // the known mass moves nothing else
-            if impact.grouping == ON_KNOWN_MASS && !matches!(felt, Felt::Force | Felt::Aimed(_)) {
+            if [ON_KNOWN_MASS, JOINT_OPEN].contains(&impact.grouping)
+                && !matches!(felt, Felt::Force | Felt::Aimed(_))
+            {
                 return None;
             }
             let (told, at) = match felt {

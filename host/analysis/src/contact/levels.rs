@@ -17,9 +17,9 @@
 use super::block::{Block, blocks};
 use super::driven::{Driven, MOTIONS, Part, REACH_HZ};
 use super::model::bulk_of_spot;
-use super::outcome::{FORCE_BALANCE, Interval, Variances, over_time, stiffness_of};
+use super::outcome::{FORCE_BALANCE, Interval, Variances, beside, over_time, stiffness_of};
 use super::parameters::{CENTRE, Cause, DELAYS, FORM, GAINS, HAMMER, INERTIA_B, Parameters, SPOTS, TIP_B};
-use super::{BAND, ContactError, Input, Known, START_M_PER_N, Stiffness};
+use super::{BAND, ContactError, Input, Known, START_M_PER_N, SecondPath, Stiffness};
 use crate::C;
 use crate::band::Band;
 use crate::frf::noise::shared_by_lines;
@@ -431,6 +431,13 @@ impl Joint {
     /// As [`Stiffness::allow_for`], whose interval is not narrower.
     pub fn allow_for(&mut self, drift: &ContactDrift) {
         if let Some(k_t) = over_time(self.k_t_n_per_m, &mut self.budget, drift) {
+            self.k_t_n_per_m = k_t;
+        }
+    }
+
+    /// As [`Stiffness::allow_for_path`], whose interval is not narrower.
+    pub fn allow_for_path(&mut self, path: &SecondPath) {
+        if let Some(k_t) = beside(self.k_t_n_per_m, &mut self.budget, path) {
             self.k_t_n_per_m = k_t;
         }
     }

@@ -13,7 +13,7 @@ use super::block::Block;
 use super::contradictions::{self, Changes, Contradiction, Worst};
 use super::parameters::{COMPLIANCE, Cause, FORM, HAMMER, MASS_ERROR, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
-use super::{ContactError, Fit, Input};
+use super::{ContactError, Fit, Input, SecondPath};
 use crate::band::Band;
 use crate::hysteresis::contact_drift::ContactDrift;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
@@ -170,6 +170,23 @@ impl Stiffness {
             None => self.doubts.push(Doubt::Drift),
         }
     }
+
+    /// Allows for a part of the force that passes beside the contact: the interval then contains
+    /// k_T with and without it. If no interval is useful, this is a doubt.
+    pub fn allow_for_path(&mut self, path: &SecondPath) {
+        let own = Contradiction::by("a second path", Cause::SecondPath, [path.part, path.std]);
+        self.contradictions.push(own);
+        match beside(self.k_t_n_per_m, &mut self.budget, path) {
+            Some(k_t) => self.k_t_n_per_m = k_t,
+            None => self.doubts.push(Doubt::SecondPath),
+        }
+    }
+}
+
+/// k_T with an interval that contains it with and without the part of the force that passes beside
+/// the contact; `None` if no useful interval remains.
+pub fn beside(k_t: Interval, budget: &mut BTreeMap<Cause, f64>, path: &SecondPath) -> Option<Interval> {
+    offset(k_t, budget, Cause::SecondPath, path.part + NORMAL_95 * path.std)
 }
 
 /// k_T with an interval that contains the stiffness in the first and in the last hits; `None` if it
@@ -412,6 +429,8 @@ pub enum Doubt {
     Sides,
     /// The contact changed while it was hit, by too much for one number.
     Drift,
+    /// Much of the force passes beside the contact.
+    SecondPath,
 }
 
 /// The compliance from a subset of the lines, with all other parameters from all lines: its

@@ -366,6 +366,8 @@ pub enum Cause {
     Bending,
     /// The contact changed while it was hit.
     Drift,
+    /// Part of the force passes beside the contact.
+    SecondPath,
     /// The model does not describe the signals down to their noise.
     Misfit,
 }
@@ -386,6 +388,7 @@ impl Cause {
             Cause::SensorAxes => "sensor-axes",
             Cause::Bending => "bending",
             Cause::Drift => "drift",
+            Cause::SecondPath => "second-path",
             Cause::Misfit => "misfit",
         }
     }

@@ -3,7 +3,9 @@
 
 use super::faults::Faults;
 use super::sensor::{ResponsePoint, WORST_GAIN, check_sensors};
-use super::{ConfigurationPlan, ON_KNOWN_MASS, Plan, configuration_name, configuration_named, turned};
+use super::{
+    ConfigurationPlan, JOINT_OPEN, ON_KNOWN_MASS, Plan, configuration_name, configuration_named, turned,
+};
 use crate::contact::determines_motion;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
 use jointrig_protocol::request::Configuration;
@@ -89,6 +91,7 @@ impl Plan {
         self.check_geometry(faults);
         self.check_configurations(faults);
         self.check_known_mass(faults);
+        self.check_open_joint(faults);
     }
 
     fn check_limits(&self, faults: &mut Faults) {
@@ -257,9 +260,9 @@ impl Plan {
                 format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes"),
             );
             faults.unless(
-                (1..=ON_KNOWN_MASS).contains(&grouping),
+                (1..=JOINT_OPEN).contains(&grouping),
                 at,
-                format!("geometry: grouping of `{name}` must be 1 to {ON_KNOWN_MASS}"),
+                format!("geometry: grouping of `{name}` must be 1 to {JOINT_OPEN}"),
             );
             let (seen, kind) =
                 if is_response { (&mut sensors, "response") } else { (&mut hammers, "impact") };
@@ -401,6 +404,44 @@ impl Plan {
         }
     }
 
+    /// Checks that hammer and vibrometer use the points of the open joint together, in a block of
+    /// the assembly, and that a cell with the joint closed can be compared with it.
+    fn check_open_joint(&self, faults: &mut Faults) {
+        for block in &self.configuration {
+            let (at, name) = (block.name.span().start, block.name.get_ref());
+            let hit = block.impacts.iter().map(|own| self.impact_is(own.get_ref(), &[JOINT_OPEN]));
+            let seen = block.responses.iter().map(|own| self.response_is(own.get_ref(), &[JOINT_OPEN]));
+            let open: Vec<bool> = hit.chain(seen).collect();
+            if !open.contains(&true) {
+                continue;
+            }
+            faults.unless(
+                !open.contains(&false),
+                at,
+                format!(
+                    "configuration `{name}`: the joint is open at points of grouping {JOINT_OPEN} and closed at all others: \
+                     give those points a block of their own"
+                ),
+            );
+            faults.unless(
+                self.configuration(name) == Some(Configuration::Ajb),
+                at,
+                format!(
+                    "configuration `{name}`: points of grouping {JOINT_OPEN} are measured in AJB, with both sides in place"
+                ),
+            );
+            faults.unless(
+                open.contains(&false) || self.open_joint_cells().is_some(),
+                at,
+                format!(
+                    "configuration `{name}`: what passes beside the open joint is compared with the closed one. This needs one impact and \
+                     one response of grouping {JOINT_OPEN}, and one cell of AJB with an impact and a response on A (grouping 1 or 3); the 3-D \
+                     vibrometer measures both responses along the sliding direction, and LDV_B is stated in geometry.sensor"
+                ),
+            );
+        }
+    }
+
     fn check_configurations(&self, faults: &mut Faults) {
         faults.unless(!self.configuration.is_empty(), 0, "configuration: there must be at least one");
         let mut seen = HashSet::new();
@@ -471,6 +512,19 @@ pub struct KnownMassCell {
     pub lasers: bool,
 }
 
+/// The cell with the joint open and the one with the joint closed that it is compared with: in both,
+/// A is struck and its motion along the sliding direction is measured.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OpenJointCells {
+    /// Impact and response of the cell with the joint open.
+    pub open: [String; 2],
+    /// The same with the joint closed.
+    pub closed: [String; 2],
+    /// Index of the axis along the sliding direction, of the open cell's response, then of the
+    /// closed one's.
+    pub axes: [usize; 2],
+}
+
 /// Response points needed to determine a rigid body's motion, and impacts needed to determine its
 /// response.
 const BODY: usize = 3;
@@ -524,15 +578,49 @@ impl Plan {
                 && self.response_is(&cell.response, &[ON_KNOWN_MASS])
         });
         let cell = on_mass.next().filter(|_| on_mass.next().is_none())?;
-        let point = self.response(&cell.response).filter(|point| point.channels.is_none())?;
-        let rows = self.to_interface();
-        let along = |(_, axis): &(String, [f64; 3])| turned(&rows, *axis)[2].abs() > SAME_DIRECTION;
         Some(KnownMassCell {
             impact: cell.impact.clone(),
             response: cell.response.clone(),
-            axis: point.axes().iter().position(along)?,
-            lasers: point.lasers,
+            axis: self.sliding_axis(&cell.response)?,
+            lasers: self.response(&cell.response)?.lasers,
         })
+    }
+
+    /// The cells that show what passes beside the joint; `None` unless the plan has exactly one
+    /// with the joint open, one with which to compare it, and a vibrometer next to the contact on
+    /// B.
+    pub fn open_joint_cells(&self) -> Option<OpenJointCells> {
+        let cells = self.cells();
+        let of = |impacts: &[u8], responses: &[u8]| -> Vec<([String; 2], usize)> {
+            let own = cells.iter().filter(|cell| {
+                cell.configuration == Configuration::Ajb
+                    && self.impact_is(&cell.impact, impacts)
+                    && self.response_is(&cell.response, responses)
+            });
+            own.filter_map(|cell| {
+                Some(([cell.impact.clone(), cell.response.clone()], self.sliding_axis(&cell.response)?))
+            })
+            .collect()
+        };
+        let [(open, axis)] = &of(&[JOINT_OPEN], &[JOINT_OPEN])[..] else { return None };
+        let place = |names: &[String; 2]| self.response(&names[1]).map(|point| point.position_m);
+        let here = place(open)?;
+        let apart = |(names, _): &([String; 2], usize)| {
+            place(names).map_or(f64::INFINITY, |at| (0..3).map(|n| (at[n] - here[n]).powi(2)).sum::<f64>())
+        };
+        let closed = of(&[1, 3], &[1, 3]);
+        let (closed, closed_axis) =
+            closed.into_iter().min_by(|one, other| apart(one).total_cmp(&apart(other)))?;
+        let ldv_b = self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == "LDV_B");
+        ldv_b.then(|| OpenJointCells { open: open.clone(), closed, axes: [*axis, closed_axis] })
+    }
+
+    /// Index of the axis along the sliding direction of a response that the 3-D vibrometer visits.
+    fn sliding_axis(&self, response: &str) -> Option<usize> {
+        let point = self.response(response).filter(|point| point.channels.is_none())?;
+        let rows = self.to_interface();
+        let along = |(_, axis): &(String, [f64; 3])| turned(&rows, *axis)[2].abs() > SAME_DIRECTION;
+        point.axes().iter().position(along)
     }
 
     /// What is missing for the stiffness between the arms; empty if nothing is.

@@ -35,23 +35,27 @@ fn hammer_and_laser_move_as_little_as_they_can() {
         for pair in cells.windows(2) {
             let same = pair[0].configuration == pair[1].configuration;
             let moved = (pair[0].impact != pair[1].impact, pair[0].response != pair[1].response);
-            // to the known mass both go together
-            let on_mass = pair
-                .iter()
-                .any(|cell| plan.response(&cell.response).is_some_and(|point| point.grouping == 7));
-            assert!(!same || on_mass || moved != (true, true), "only one of the two moves: {pair:?}");
+            // to the known mass and to the open joint both go together
+            let apart = pair.iter().any(|cell| {
+                let point = plan.response(&cell.response);
+                point.is_some_and(|point| [ON_KNOWN_MASS, JOINT_OPEN].contains(&point.grouping))
+            });
+            assert!(!same || apart || moved != (true, true), "only one of the two moves: {pair:?}");
         }
     }
 }
 
 #[test]
-fn the_contacts_plan_has_58_cells_and_no_a() {
+fn the_contacts_plan_has_60_cells_and_no_a() {
     let plan = Plan::parse(CONTACT, "contact.toml").expect("a good plan");
     let cells = plan.cells();
     let of = |wanted| cells.iter().filter(|cell| cell.configuration == wanted).count();
-    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 28, 30));
+    assert_eq!((of(Configuration::A), of(Configuration::B), of(Configuration::Ajb)), (0, 28, 32));
     assert_eq!((plan.hits.get_ref().wanted, plan.hits.get_ref().minimum), (6, 2));
-    assert_eq!(plan.configuration.len(), 3);
+    assert_eq!(plan.configuration.len(), 5);
+    // a joint that is opened later is another one
+    let open = cells.iter().position(|cell| cell.impact == "OPEN");
+    assert_eq!(open, cells.iter().position(|cell| cell.configuration == Configuration::Ajb));
 }
 
 #[test]
@@ -162,6 +166,25 @@ fn a_known_mass_has_a_cell_of_its_own_in_b() {
             "0.0363], direction = [0, -1, 0]",
             "must be the sliding direction",
         ),
+    ] {
+        assert!(CONTACT.contains(from), "{from}");
+        let wrong = Plan::parse(&CONTACT.replacen(from, to, 1), "my.toml").expect_err(from).to_string();
+        assert!(wrong.contains(said), "{from}: {wrong}");
+    }
+}
+
+#[test]
+fn the_open_joint_has_a_cell_of_its_own_and_one_to_compare_with() {
+    let plan = Plan::parse(CONTACT, "contact.toml").expect("a good plan");
+    let cells = plan.open_joint_cells().expect("an open joint");
+    assert_eq!((cells.open, cells.axes), (["OPEN", "OPEN"].map(String::from), [2, 2]));
+    assert_eq!(cells.closed, ["AZ3", "A3"].map(String::from));
+    let block = "name = \"AJB\"\nimpacts = [\"OPEN\"]\nresponses = [\"OPEN\"]";
+    for (from, to, said) in [
+        (block, "name = \"AJB\"\nimpacts = [\"OPEN\"]\nresponses = [\"A3\"]", "a block of their own"),
+        (block, "name = \"B\"\nimpacts = [\"OPEN\"]\nresponses = [\"OPEN\"]", "are measured in AJB"),
+        ("name = \"A3\", grouping = 3", "name = \"A3\", grouping = 4", "compared with the closed one"),
+        ("{ name = \"LDV_B\", position_m", "{ name = \"LDV_C\", position_m", "LDV_B is stated"),
     ] {
         assert!(CONTACT.contains(from), "{from}");
         let wrong = Plan::parse(&CONTACT.replacen(from, to, 1), "my.toml").expect_err(from).to_string();

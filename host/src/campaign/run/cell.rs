@@ -12,7 +12,7 @@ use super::error::RunError;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
 use super::stage::{Moved, Stage, Who};
-use crate::campaign::plan::{Cell, Settle, configuration_name};
+use crate::campaign::plan::{Cell, JOINT_OPEN, Settle, configuration_name};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::codec;
 use crate::campaign::verdict::others::Others;
@@ -22,6 +22,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::samples::Samples;
 use crate::device::stream::Recording;
 use jointrig_protocol::channel::Quantity;
+use jointrig_protocol::request::Configuration;
 use jointrig_protocol::shot::Shot;
 use std::collections::VecDeque;
 use std::f64::consts::PI;
@@ -317,9 +318,22 @@ impl Runner<'_> {
             let others = if all { "; LDV_A and LDV_B too" } else { "" };
             format!(" ({}{others})", millimetres(point.position_m))
         });
+        let opens = |name: &str| {
+            let own = geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == name);
+            own.is_some_and(|point| point.grouping == JOINT_OPEN)
+        };
+        let joint = if opens(&cell.impact) {
+            "\n  the joint open: both sides in place, nothing touches"
+        } else if cell.configuration == Configuration::Ajb
+            && self.cells.iter().any(|other| opens(&other.cell.impact))
+        {
+            "\n  the joint closed"
+        } else {
+            ""
+        };
         let place = 1 + self.cells.iter().position(|other| other.id == row.id).unwrap_or(0);
         format!(
-            "cell {place} of {}, structure {}: {} of {} good\n  hammer to {}{hammer}\n  laser to {}{laser}",
+            "cell {place} of {}, structure {}: {} of {} good{joint}\n  hammer to {}{hammer}\n  laser to {}{laser}",
             self.cells.len(),
             configuration_name(cell.configuration),
             self.tally.kept_in(row.id),

@@ -83,6 +83,7 @@ pub fn of_cause(cause: Cause) -> &'static str {
         Cause::SensorAxes => "the directions of the fixed sensors' axes",
         Cause::Bending => "bending and shear of the specimens between sensors and contact",
         Cause::Drift => "the contact's change while it was hit",
+        Cause::SecondPath => "the force that passes beside the contact",
         Cause::Misfit => "signals that the model does not explain",
     }
 }
@@ -145,6 +146,10 @@ fn of_contradiction(one: &Contradiction) -> String {
             "The contact changed between the first and the last hits on A: T over the displacement between the spots changed by {off}. Look for wear, for a \
              normal load that relaxes, and for temperature."
         ),
+        Cause::SecondPath => format!(
+            "About {off} of the force between the arms passes beside the contact, as the hits with the joint open show, and makes k_T seem stiffer by as much: \
+             remove the cable, hose or stop that joins the two sides, and measure the assembly again."
+        ),
         Cause::Skew => {
             format!("{name} seems off by {off}: check the filters and the clock of its channel.")
         }
@@ -174,7 +179,9 @@ fn how_far(one: &Contradiction) -> String {
     let of = |(axis, own): (usize, &[f64; 2])| {
         let [off, _] = *own;
         (significance(own) >= most.min(3.0)).then(|| match one.cause {
-            Cause::Gains | Cause::SensorAxes | Cause::Drift => format!("{:.1} %", 100.0 * off.abs()),
+            Cause::Gains | Cause::SensorAxes | Cause::Drift | Cause::SecondPath => {
+                format!("{:.1} %", 100.0 * off.abs())
+            }
             Cause::Skew => format!("{:.0} µs", 1e6 * off.abs()),
             Cause::HammerTilt => format!("{:.1}°", off.abs().asin().to_degrees()),
             _ => format!("{:.2} mm along {}", 1e3 * off.abs(), ["x", "y", "z"][axis % 3]),
@@ -210,6 +217,9 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
             });
         }
         Doubt::Drift => "the contact changed too much while it was hit for one stiffness to describe it",
+        Doubt::SecondPath => {
+            "much of the force between the arms passes beside the contact, as the hits with the joint open show"
+        }
         Doubt::Flatness => "the stiffness changes with frequency, which a contact's stiffness does not",
         Doubt::Sides => {
             "hits on A and on the moving mass give different values (has the contact changed between them? compare the first hits with later ones)"
