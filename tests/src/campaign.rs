@@ -67,11 +67,13 @@ pub fn without_known_mass(plan: &str) -> String {
     text
 }
 
-/// The contact plan with 42 hits of one second.
+/// The contact plan with 42 hits of one second, without the known mass and the open joint.
 #[must_use]
 pub fn short_contact_plan() -> String {
     let mut text = without_known_mass(&one_second(CONTACT));
     for (old, new) in [
+        ("[[configuration]]\nname = \"AJB\"\nimpacts = [\"OPEN\"]\nresponses = [\"OPEN\"]\n", ""),
+        ("[[configuration]]\nname = \"AJB\"\nimpacts = [\"AZ3\"]\nresponses = [\"A3\"]\n", ""),
         ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
         ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\"]", "impacts = [\"AZ1\", \"AZ3\"]"),
         ("\"C4\", \"D1\", \"D2\", \"D3\", \"B1\"", "\"B1\""),

@@ -174,7 +174,8 @@ impl Stiffness {
     /// Allows for a part of the force that passes beside the contact: the interval then contains
     /// k_T with and without it. If no interval is useful, this is a doubt.
     pub fn allow_for_path(&mut self, path: &SecondPath) {
-        let own = Contradiction::by("a second path", Cause::SecondPath, [path.part, path.std]);
+        let what = format!("a second path of {:.1} N/µm", 1e-6 * path.stiffness_n_per_m);
+        let own = Contradiction::by(&what, Cause::SecondPath, [path.part, path.std]);
         self.contradictions.push(own);
         match beside(self.k_t_n_per_m, &mut self.budget, path) {
             Some(k_t) => self.k_t_n_per_m = k_t,

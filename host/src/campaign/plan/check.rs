@@ -4,7 +4,7 @@
 use super::faults::Faults;
 use super::sensor::{ResponsePoint, WORST_GAIN, check_sensors};
 use super::{
-    ConfigurationPlan, JOINT_OPEN, ON_KNOWN_MASS, Plan, configuration_name, configuration_named, turned,
+    Cell, ConfigurationPlan, JOINT_OPEN, ON_KNOWN_MASS, Plan, configuration_name, configuration_named, turned,
 };
 use crate::contact::determines_motion;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
@@ -613,6 +613,11 @@ impl Plan {
             closed.into_iter().min_by(|one, other| apart(one).total_cmp(&apart(other)))?;
         let ldv_b = self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == "LDV_B");
         ldv_b.then(|| OpenJointCells { open: open.clone(), closed, axes: [*axis, closed_axis] })
+    }
+
+    /// Whether the joint is open in this cell.
+    pub fn opens_joint(&self, cell: &Cell) -> bool {
+        self.impact_is(&cell.impact, &[JOINT_OPEN])
     }
 
     /// Index of the axis along the sliding direction of a response that the 3-D vibrometer visits.

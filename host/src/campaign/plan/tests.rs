@@ -109,7 +109,7 @@ fn errors_point_at_line_and_field() {
         ("responses = [\"B1\"]", "responses = [\"B1\", \"B1\"]", "is listed twice"),
         ("name = \"B\"", "name = \"C\"", "must be A, B or AJB"),
         ("direction = [0, -1, 0]", "direction = [0, -2, 0]", "length 1"),
-        ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 8", "must be 1 to 7"),
+        ("{ name = \"A2\", grouping = 1", "{ name = \"A2\", grouping = 9", "must be 1 to 8"),
         (
             "{ name = \"A2\", grouping = 1",
             "{ name = \"A2\", sigma_m = -1e-5, grouping = 1",

@@ -12,7 +12,7 @@ use super::error::RunError;
 use super::runner::{Next, Runner, still};
 use super::shot::{Outcome, QuietLimits};
 use super::stage::{Moved, Stage, Who};
-use crate::campaign::plan::{Cell, JOINT_OPEN, Settle, configuration_name};
+use crate::campaign::plan::{Cell, Settle, configuration_name};
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::codec;
 use crate::campaign::verdict::others::Others;
@@ -318,14 +318,10 @@ impl Runner<'_> {
             let others = if all { "; LDV_A and LDV_B too" } else { "" };
             format!(" ({}{others})", millimetres(point.position_m))
         });
-        let opens = |name: &str| {
-            let own = geometry.impact.iter().map(toml::Spanned::get_ref).find(|point| point.name == name);
-            own.is_some_and(|point| point.grouping == JOINT_OPEN)
-        };
-        let joint = if opens(&cell.impact) {
+        let joint = if self.plan.opens_joint(cell) {
             "\n  the joint open: both sides in place, nothing touches"
         } else if cell.configuration == Configuration::Ajb
-            && self.cells.iter().any(|other| opens(&other.cell.impact))
+            && self.cells.iter().any(|other| self.plan.opens_joint(&other.cell))
         {
             "\n  the joint closed"
         } else {

@@ -147,8 +147,9 @@ fn of_contradiction(one: &Contradiction) -> String {
              normal load that relaxes, and for temperature."
         ),
         Cause::SecondPath => format!(
-            "About {off} of the force between the arms passes beside the contact, as the hits with the joint open show, and makes k_T seem stiffer by as much: \
-             remove the cable, hose or stop that joins the two sides, and measure the assembly again."
+            "About {off} of the force between the arms passes beside the contact, by {}, as the hits with the joint open show, and makes k_T seem stiffer by as much: \
+             remove the cable, hose or stop that joins the two sides, and measure the assembly again.",
+            one.what
         ),
         Cause::Skew => {
             format!("{name} seems off by {off}: check the filters and the clock of its channel.")

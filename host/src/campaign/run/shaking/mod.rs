@@ -20,8 +20,8 @@
 use super::answers::Edits;
 use super::pulse::with_sensors;
 use super::stage::same_or_accepted;
-use crate::campaign::plan::Plan;
 use crate::campaign::plan::level::{Held, Level, Moment};
+use crate::campaign::plan::{Cell, Plan};
 use crate::campaign::store::Store;
 use crate::campaign::store::is_simulated_board;
 use crate::campaign::store::level_table::{LevelRow, NewLevel, Settled};
@@ -231,10 +231,11 @@ fn clipped(channels: &ChannelMap, samples: &Samples, scans: Range<usize>) -> Opt
     (0..channels.len()).filter(at_contact).find(full).map(|place| channels.channels[place].name.to_string())
 }
 
-/// Selects the assembly on a virtual rig.
+/// Selects the assembly, its joint closed, on a virtual rig.
 fn assemble(session: &mut Session, plan: &Plan) -> Result<(), ShakeError> {
     let cells = plan.cells();
-    let Some(cell) = cells.iter().find(|cell| cell.configuration == Configuration::Ajb) else {
+    let joined = |cell: &&Cell| cell.configuration == Configuration::Ajb && !plan.opens_joint(cell);
+    let Some(cell) = cells.iter().find(joined) else {
         return Err(ShakeError::NoAssembly);
     };
     let name = |text: &String| {
