@@ -261,9 +261,9 @@ pub const LEVELS_HZ: [f64; 6] = [100.0, 150.0, 200.0, 300.0, 400.0, 500.0];
 /// sticks.
 pub fn levels_plan(rig: &RigConfig) -> String {
     let plan = contact_plan(rig);
-    let last = "\"AZ3\"]";
+    let last = "\"AZ2\", \"AZ3\"]";
     assert!(plan.contains(last));
-    let where_it_pushes = plan.replace(last, "\"AZ3\", \"I_MZ\"]");
+    let where_it_pushes = plan.replace(last, "\"AZ2\", \"AZ3\", \"I_MZ\"]");
     format!("{where_it_pushes}\n[shaker]\nfrequencies_hz = {LEVELS_HZ:?}\namplitudes_m = [1.5e-7]\n")
 }
 

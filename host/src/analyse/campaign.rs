@@ -11,8 +11,7 @@ use super::from_frfs::{Fit, NoFit, Substructured, fits, recommended};
 use super::missing::{Missing, given_up};
 use super::modal::{FoundModes, MODES_HZ};
 use super::{
-    cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode, known_mass,
-    open_joint,
+    cells_stage, chosen, configuration_stage, contact_answer, contact_stage, first_mode, separate_cells,
 };
 use crate::contact::SecondPath;
 use crate::results::MAIN_BAND;
@@ -38,11 +37,11 @@ pub fn analyse_measurements<M: Measurements>(
     let mut cells = cells_stage::read_all(measurements, &names, wanted.replicates > 0, progress);
     let mut missing = std::mem::take(&mut cells.missing);
     missing.extend(given_up(&names, measurements.given_up()));
-    let known_mass = known_mass::compared(measurements).unwrap_or_else(|why| {
+    let known_mass = separate_cells::known_mass(measurements).unwrap_or_else(|why| {
         missing.push(why);
         None
     });
-    let second_path = open_joint::second_path(measurements).unwrap_or_else(|why| {
+    let second_path = separate_cells::second_path(measurements).unwrap_or_else(|why| {
         missing.push(why);
         None
     });

@@ -112,9 +112,10 @@ pub struct MassCell {
     pub lasers: bool,
 }
 
-/// The cells that show what passes beside the contact: A is struck with the joint open, then closed.
+/// The cells that show what passes beside the contact: A is struck with the joint open, then
+/// closed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OpenJoint {
+pub struct OpenAndClosed {
     /// The cell with the joint open.
     pub open: CellName,
     /// The cell with the joint closed.
@@ -227,7 +228,7 @@ pub trait Measurements: Sync {
 
     /// The cells that show what passes beside the contact, if the plan has them. The one with the
     /// joint open is not one of [`Measurements::cells`].
-    fn open_joint(&self) -> Option<OpenJoint> {
+    fn open_joint(&self) -> Option<OpenAndClosed> {
         None
     }
 

@@ -114,31 +114,6 @@ pub fn read<M: Measurements>(measurements: &M, name: &CellName, keep_hits: bool)
     found
 }
 
-/// The average of one cell that is analysed apart from the others; `None` before its first hit.
-///
-/// # Errors
-/// The hits cannot be read, or do not match.
-pub fn average<M: Measurements>(
-    measurements: &M,
-    name: &CellName,
-    asked: Asked,
-) -> Result<Option<CellAverage>, Missing> {
-    let records = |told: String| Missing::Records { cell: name.clone(), told };
-    let mut sums = CellSums::new(name.clone(), measurements.sigma_per_s(), asked, LINES_HZ);
-    let (mut hits, mut unfit) = (0, None);
-    let read = measurements.each_hit(name, asked.contact || asked.damped, &mut |hit, fs_hz| {
-        if unfit.is_none() {
-            unfit = sums.add(hit, fs_hz).err();
-            hits += 1;
-        }
-    });
-    read.map_err(|error| records(error.to_string()))?;
-    if hits == 0 {
-        return Ok(None);
-    }
-    unfit.map_or_else(|| sums.finish(), Err).map(Some).map_err(|error| records(error.to_string()))
-}
-
 /// Whether hits at this impact move the contact along z from A's side: hits on B drive the load
 /// cells directly, and hits along x cause no motion in z.
 fn counts_for_contact(geometry: &Geometry, name: &CellName) -> bool {

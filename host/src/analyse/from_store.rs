@@ -6,7 +6,7 @@ use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
 use super::cell::{
-    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, OpenJoint, Progress, SensorMass,
+    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, OpenAndClosed, Progress, SensorMass,
     ShakerLevel, Wanted,
 };
 use super::chosen::DataQuality;
@@ -557,14 +557,14 @@ impl Measurements for CampaignFile {
         })
     }
 
-    fn open_joint(&self) -> Option<OpenJoint> {
+    fn open_joint(&self) -> Option<OpenAndClosed> {
         let OpenJointCells { open, closed, axes } = self.plan.open_joint_cells()?;
         let [open, closed] = [open, closed].map(|[impact, response]| CellName {
             configuration: Structure::Ajb,
             impact,
             response,
         });
-        Some(OpenJoint { open, closed, axes })
+        Some(OpenAndClosed { open, closed, axes })
     }
 
     fn sensor_masses(&self) -> Vec<SensorMass> {

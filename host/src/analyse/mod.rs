@@ -27,15 +27,14 @@ mod first_mode;
 mod from_frfs;
 mod from_store;
 mod impact_loops;
-mod known_mass;
 mod missing;
 mod modal;
 pub mod next_cell;
-mod open_joint;
 mod plan_geometry;
 mod question;
 #[cfg(test)]
 mod rig_tests;
+mod separate_cells;
 mod shaker_levels;
 #[cfg(test)]
 mod shaker_levels_tests;

@@ -10,7 +10,7 @@ use super::cell::{CellName, KnownContact, Measurements};
 use super::cells_stage::{Cells, drift_of_the_contact, read, slip_under_the_hammer};
 use super::contact_answer::{cells as contact_cells, input, reads};
 use super::from_store::{AnalyseError, CampaignFile};
-use super::{known_mass, open_joint};
+use super::separate_cells::{known_mass, second_path};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::contact::{
@@ -199,14 +199,14 @@ pub fn outlook(store: &Store, times: Times, averaged: &mut Averaged) -> Result<O
         .collect();
     // if the hits on the known mass or with the joint open cannot be read, the analysis reports it,
     // and the interval is that without them
-    let mass = known_mass::compared(&file).unwrap_or_default();
+    let mass = known_mass(&file).unwrap_or_default();
     let planned: Vec<PlannedCell<'_>> = without.iter().filter_map(|name| planned(&file, name)).collect();
     let (mut found, mut forecast) = forecast(&input(&file, cells, mass), &planned)?;
     if let Some(drift) = drift_of_the_contact(&all.at_contact).filter(|drift| drift.found() == Some(true)) {
         found.allow_for(&drift);
         forecast.state(&found.k_t_n_per_m);
     }
-    if let Some(path) = open_joint::second_path(&file).unwrap_or_default().filter(SecondPath::found) {
+    if let Some(path) = second_path(&file).unwrap_or_default().filter(SecondPath::found) {
         found.allow_for_path(&path);
         forecast.state(&found.k_t_n_per_m);
     }

@@ -1,6 +1,6 @@
 //! The geometry of a plan.
 
-use crate::campaign::plan::{ConfigurationPlan, JOINT_OPEN, ON_KNOWN_MASS, Plan, turned};
+use crate::campaign::plan::{ConfigurationPlan, Plan, SEPARATE, turned};
 use crate::results::Place;
 use crate::structure::Structure;
 use crate::substructuring::geometry::{Configuration, Geometry, Grouping, Point};
@@ -81,5 +81,5 @@ pub fn places(plan: &Plan) -> Vec<Place> {
         position_m: p.position_m,
         direction: Some(p.direction),
     });
-    responses.chain(impacts).filter(|place| ![ON_KNOWN_MASS, JOINT_OPEN].contains(&place.grouping)).collect()
+    responses.chain(impacts).filter(|place| !SEPARATE.contains(&place.grouping)).collect()
 }

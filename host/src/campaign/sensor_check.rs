@@ -25,7 +25,7 @@
 use jointrig_protocol::channel::{Axis, Quantity, Role};
 use jointrig_protocol::request::Configuration;
 
-use super::plan::{ImpactPoint, JOINT_OPEN, ON_KNOWN_MASS, Plan, ResponsePoint, configuration_name};
+use super::plan::{ImpactPoint, Plan, ResponsePoint, SEPARATE, configuration_name};
 use super::store::Store;
 use super::store::error::StoreError;
 use super::store::record_table::RecordRow;
@@ -279,10 +279,8 @@ fn candidates<'a>(
             let impact = impact(plan, &cell.impact)?;
             let looked_at = plan.response(&cell.response)?;
             let assembly = cell.configuration == Configuration::Ajb;
-            // the known mass moves nothing else
-            if [ON_KNOWN_MASS, JOINT_OPEN].contains(&impact.grouping)
-                && !matches!(felt, Felt::Force | Felt::Aimed(_))
-            {
+            // the known mass moves nothing else, nor does A while the joint is open
+            if SEPARATE.contains(&impact.grouping) && !matches!(felt, Felt::Force | Felt::Aimed(_)) {
                 return None;
             }
             let (told, at) = match felt {

@@ -175,7 +175,7 @@ impl Stiffness {
     /// k_T with and without it. If no interval is useful, this is a doubt.
     pub fn allow_for_path(&mut self, path: &SecondPath) {
         let what = format!("a second path of {:.1} N/µm", 1e-6 * path.stiffness_n_per_m);
-        let own = Contradiction::by(&what, Cause::SecondPath, [path.part, path.std]);
+        let own = Contradiction::by(&what, Cause::SecondPath, [path.part, path.std()]);
         self.contradictions.push(own);
         match beside(self.k_t_n_per_m, &mut self.budget, path) {
             Some(k_t) => self.k_t_n_per_m = k_t,
@@ -187,7 +187,7 @@ impl Stiffness {
 /// k_T with an interval that contains it with and without the part of the force that passes beside
 /// the contact; `None` if no useful interval remains.
 pub fn beside(k_t: Interval, budget: &mut BTreeMap<Cause, f64>, path: &SecondPath) -> Option<Interval> {
-    offset(k_t, budget, Cause::SecondPath, path.part + NORMAL_95 * path.std)
+    offset(k_t, budget, Cause::SecondPath, path.part + NORMAL_95 * path.std())
 }
 
 /// k_T with an interval that contains the stiffness in the first and in the last hits; `None` if it

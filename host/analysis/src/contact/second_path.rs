@@ -26,7 +26,7 @@ const PLACE: f64 = 0.3;
 /// Parts below this are no concern: k_T's interval is wider.
 const MUCH: f64 = 0.005;
 
-/// Standard deviations beyond which a part is certain.
+/// Standard deviations of the noise beyond which there is a path for certain, wherever it is.
 const CERTAIN: f64 = 4.0;
 
 /// Hits on A along the sliding direction: the response of arm A, v_A and v_B at the spots, and T.
@@ -56,8 +56,8 @@ impl HitsOnA<'_> {
 pub struct SecondPath {
     /// That part: 0.1 is a tenth.
     pub part: f64,
-    /// Its standard deviation.
-    pub std: f64,
+    /// Its standard deviation from noise alone.
+    pub noise: f64,
     /// The path's stiffness, N/m.
     pub stiffness_n_per_m: f64,
 }
@@ -70,30 +70,29 @@ impl SecondPath {
         if frequency_hz != closed.spectra.frequency_hz() {
             return None;
         }
-        let lines = || (0..frequency_hz.len()).filter(|l| LINES.contains(frequency_hz[*l]));
+        let lines = (0..frequency_hz.len()).filter(|l| LINES.contains(frequency_hz[*l]));
         let both = |l: usize| Some([open.stiffness_n_per_m(l)?, closed.stiffness_n_per_m(l)?]);
-        let both: Vec<[C; 2]> = lines().filter_map(both).collect();
-        let [first, second] = {
-            let mut two = lines();
-            [two.next()?, two.next()?]
-        };
+        let both: Vec<[C; 2]> = lines.filter_map(both).collect();
+        let [first, second, ..] = frequency_hz[..] else { return None };
         let parts: Vec<f64> = both.iter().map(|[open, closed]| (open / closed).re).collect();
         let part = median(&parts);
         let deviations: Vec<f64> = parts.iter().map(|own| (own - part).abs()).collect();
-        let shared = shared_by_lines(open.spectra.sigma_per_s(), frequency_hz[second] - frequency_hz[first]);
+        let shared = shared_by_lines(open.spectra.sigma_per_s(), second - first);
         let of_median = 0.5 * std::f64::consts::PI * shared / parts.len() as f64;
-        let scatter = OF_NORMAL * median(&deviations) * of_median.sqrt();
+        let noise = OF_NORMAL * median(&deviations) * of_median.sqrt();
         let stiffness: Vec<f64> = both.iter().map(|[open, _]| open.re).collect();
-        let found = Self { part, std: scatter.hypot(PLACE * part), stiffness_n_per_m: median(&stiffness) };
-        (part.is_finite() && found.std > 0.0).then_some(found)
+        let found = Self { part, noise, stiffness_n_per_m: median(&stiffness) };
+        (part.is_finite() && found.std() > 0.0).then_some(found)
+    }
+
+    /// The part's standard deviation: noise, and the place of the path, which is not known.
+    pub fn std(&self) -> f64 {
+        self.noise.hypot(PLACE * self.part)
     }
 
     /// Whether there is a path that matters.
     pub fn found(&self) -> bool {
-        // the uncertainty of its place does not make it less certain that it exists
-        let of_place = PLACE * self.part;
-        let scatter = (self.std * self.std - of_place * of_place).max(0.0).sqrt();
-        self.part > MUCH && self.part > CERTAIN * scatter
+        self.part > MUCH && self.part > CERTAIN * self.noise
     }
 }
 

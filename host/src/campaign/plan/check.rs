@@ -369,15 +369,13 @@ impl Plan {
         let mut separate = true;
         for block in &self.configuration {
             let (at, name) = (block.name.span().start, block.name.get_ref());
-            let hit = block.impacts.iter().map(|own| self.impact_is(own.get_ref(), &[ON_KNOWN_MASS]));
-            let seen = block.responses.iter().map(|own| self.response_is(own.get_ref(), &[ON_KNOWN_MASS]));
-            let on_mass: Vec<bool> = hit.chain(seen).collect();
-            if !on_mass.contains(&true) {
+            let [any, all] = self.any_and_all(block, ON_KNOWN_MASS);
+            if !any {
                 continue;
             }
-            separate &= !on_mass.contains(&false);
+            separate &= all;
             faults.unless(
-                !on_mass.contains(&false),
+                all,
                 at,
                 format!(
                     "configuration `{name}`: points of grouping {ON_KNOWN_MASS} are on the known mass, which is connected to nothing: \
@@ -404,19 +402,25 @@ impl Plan {
         }
     }
 
+    /// Whether any of a block's points has this grouping, and whether all have.
+    fn any_and_all(&self, block: &ConfigurationPlan, grouping: u8) -> [bool; 2] {
+        let hit = block.impacts.iter().map(|own| self.impact_is(own.get_ref(), &[grouping]));
+        let seen = block.responses.iter().map(|own| self.response_is(own.get_ref(), &[grouping]));
+        let own: Vec<bool> = hit.chain(seen).collect();
+        [own.contains(&true), !own.contains(&false)]
+    }
+
     /// Checks that hammer and vibrometer use the points of the open joint together, in a block of
     /// the assembly, and that a cell with the joint closed can be compared with it.
     fn check_open_joint(&self, faults: &mut Faults) {
         for block in &self.configuration {
             let (at, name) = (block.name.span().start, block.name.get_ref());
-            let hit = block.impacts.iter().map(|own| self.impact_is(own.get_ref(), &[JOINT_OPEN]));
-            let seen = block.responses.iter().map(|own| self.response_is(own.get_ref(), &[JOINT_OPEN]));
-            let open: Vec<bool> = hit.chain(seen).collect();
-            if !open.contains(&true) {
+            let [any, all] = self.any_and_all(block, JOINT_OPEN);
+            if !any {
                 continue;
             }
             faults.unless(
-                !open.contains(&false),
+                all,
                 at,
                 format!(
                     "configuration `{name}`: the joint is open at points of grouping {JOINT_OPEN} and closed at all others: \
@@ -431,7 +435,7 @@ impl Plan {
                 ),
             );
             faults.unless(
-                open.contains(&false) || self.open_joint_cells().is_some(),
+                !all || self.open_joint_cells().is_some(),
                 at,
                 format!(
                     "configuration `{name}`: what passes beside the open joint is compared with the closed one. This needs one impact and \
@@ -512,8 +516,8 @@ pub struct KnownMassCell {
     pub lasers: bool,
 }
 
-/// The cell with the joint open and the one with the joint closed that it is compared with: in both,
-/// A is struck and its motion along the sliding direction is measured.
+/// The cell with the joint open and the one with the joint closed that it is compared with: in
+/// both, A is struck and its motion along the sliding direction is measured.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OpenJointCells {
     /// Impact and response of the cell with the joint open.

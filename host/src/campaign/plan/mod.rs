@@ -499,6 +499,9 @@ pub const ON_KNOWN_MASS: u8 = 7;
 /// Grouping of the points of side A that are used while the joint is open.
 pub const JOINT_OPEN: u8 = 8;
 
+/// The groupings of points that are on none of the structures A, B and AJB as they are analysed.
+pub const SEPARATE: [u8; 2] = [ON_KNOWN_MASS, JOINT_OPEN];
+
 /// Standard deviations; values that are absent default to those of careful manual work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -38,7 +38,7 @@ fn hammer_and_laser_move_as_little_as_they_can() {
             // to the known mass and to the open joint both go together
             let apart = pair.iter().any(|cell| {
                 let point = plan.response(&cell.response);
-                point.is_some_and(|point| [ON_KNOWN_MASS, JOINT_OPEN].contains(&point.grouping))
+                point.is_some_and(|point| SEPARATE.contains(&point.grouping))
             });
             assert!(!same || apart || moved != (true, true), "only one of the two moves: {pair:?}");
         }
