@@ -276,6 +276,8 @@ pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
 pub const HAMMER_SLIP: &str = "hammer-slip";
 /// Name of the check that the contact is the same in all hits.
 pub const STEADY: &str = "contact-steady";
+/// Name of the check that the data do not contradict what the plan states.
+pub const AS_STATED: &str = "plan-as-stated";
 /// Name of the check on wear.
 pub const UNCHANGED: &str = "contact-unchanged";
 /// Name of the check on the masses of fixed sensors.

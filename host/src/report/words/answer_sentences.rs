@@ -108,17 +108,25 @@ fn contradicted(all: &[Contradiction]) -> String {
     format!(" The data contradict the plan.{}", told.concat())
 }
 
-fn of_contradiction(one: &Contradiction) -> String {
+/// What of the plan is contradicted, in a few words.
+pub fn contradicted_quantity(one: &Contradiction) -> String {
+    match one.cause {
+        Cause::SecondPath => "a second path beside the contact".into(),
+        cause if one.scatter.is_some() => of_cause(cause).into(),
+        Cause::SpecimenPoints | Cause::ArmPoints => one.what.clone(),
+        _ => format!("the {}", one.what.trim_start_matches("the ")),
+    }
+}
+
+/// What of the plan is contradicted, by how much, and what to do.
+pub fn of_contradiction(one: &Contradiction) -> String {
     if let Some(times) = one.scatter {
         return format!(
             "{} are off {times:.1} times as far as stated: measure them again, or state in [priors] how well they are known.",
             capitalised(of_cause(one.cause))
         );
     }
-    let name = match one.cause {
-        Cause::SpecimenPoints | Cause::ArmPoints => capitalised(&one.what),
-        _ => capitalised(&format!("the {}", one.what.trim_start_matches("the "))),
-    };
+    let name = capitalised(&contradicted_quantity(one));
     if let Some(other) = &one.exchanged_with {
         return format!("{name} was found where the plan has {other}, and the reverse: are they exchanged?");
     }

@@ -9,8 +9,8 @@ use super::summary;
 use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::Interval;
 use crate::results::{
-    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Joint, ONE_STRUCTURE,
-    Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED, headline_rank,
+    AS_STATED, BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Joint,
+    ONE_STRUCTURE, Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED, headline_rank,
 };
 use crate::substructuring::{Dof, fit};
 
@@ -114,6 +114,8 @@ pub fn failed(check: &Check) -> String {
                 .into()
         }
         STEADY => "The contact changed while it was hit: k_T is a mean over that time.".into(),
+        // its first sentence names what is off
+        AS_STATED => format!("{}.", check.meaning.split(". ").next().unwrap_or_default()),
         UNCHANGED => "The contact is not the same after the hits as before.".into(),
         INTERFACE_MODES => "Six rigid motions do not describe what couples the parts.".into(),
         INTERNALS => "The points away from the interface do not suffice for every method.".into(),

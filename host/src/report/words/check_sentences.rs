@@ -1,5 +1,6 @@
 //! The checks, each with its outcome, its figures, and its meaning for the reader.
 
+use super::answer_sentences::{contradicted_quantity, of_contradiction};
 use super::number::{decimals, micro, short};
 use crate::analyse::Findings;
 use crate::analyse::checks::contact_change::ContactChange;
@@ -7,13 +8,14 @@ use crate::analyse::checks::{
     BackCoupled, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness, SensorMasses,
     SeriesCompliance, Sizes, rigid_motions_suffice,
 };
+use crate::contact::{Cause, Contradiction};
 use crate::hysteresis::compliance::ImaginaryPeak;
 use crate::hysteresis::contact_drift::ContactDrift;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
 use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
 use crate::results::{
-    BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, ONE_STRUCTURE,
-    SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED,
+    AS_STATED, BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS,
+    ONE_STRUCTURE, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED,
 };
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
@@ -29,6 +31,9 @@ pub fn all(found: &Findings) -> Vec<Check> {
         checks.extend(of_frfs.internals.as_ref().map(internals));
         checks.extend(of_frfs.same_structures.as_ref().map(same_structures));
         checks.extend(of_frfs.back_coupled.as_ref().map(back_coupled));
+    }
+    if let Some(Ok(own)) = &found.own_stiffness {
+        checks.push(as_stated(&own.contradictions));
     }
     if let Some(contact) = &found.contact {
         checks.push(series_compliance(&contact.series));
@@ -357,6 +362,26 @@ fn phases(split: &PhaseSplit) -> String {
     )
 }
 
+/// Whether the fit of the contact finds places, gains, delays and directions where the plan has
+/// them. That the contact changed is a check of its own.
+fn as_stated(all: &[Contradiction]) -> Check {
+    let own: Vec<&Contradiction> = all.iter().filter(|one| one.cause != Cause::Drift).collect();
+    if own.is_empty() {
+        return Check::new(
+            AS_STATED,
+            Some(true),
+            "Places, gains, delays and directions are as the plan states them, within its stated errors.",
+        );
+    }
+    let names: Vec<String> = own.iter().map(|one| contradicted_quantity(one)).collect();
+    let told: Vec<String> = own.iter().map(|one| of_contradiction(one)).collect();
+    Check::new(
+        AS_STATED,
+        Some(false),
+        format!("Not as the plan states: {}. {}", names.join("; "), told.join(" ")),
+    )
+}
+
 /// Whether the contact's stiffness changed from the first hits on A to the last.
 fn contact_drift(found: &ContactDrift) -> Check {
     let ContactDrift { change, std, cells, .. } = *found;
@@ -417,6 +442,28 @@ mod tests {
         let open = SeriesCompliance::ClampGivesWay { sizes, compliance_m_per_n: 1e-9, std_m_per_n: 1e-8 };
         let open = series_compliance(&open);
         assert!(open.meaning.contains("…∞") && open.values.len() == 7, "{open:?}");
+    }
+
+    #[test]
+    fn what_the_data_contradict_is_named_first() {
+        let of = |what: &str, cause, off: f64| Contradiction {
+            what: what.into(),
+            cause,
+            off: vec![[off, 0.1 * off]],
+            scatter: None,
+            exchanged_with: None,
+        };
+        let gain = of("gain of the vibrometer on A's spot", Cause::Gains, 0.043);
+        let path = of("2.8 N/µm", Cause::SecondPath, 0.1);
+        let check = as_stated(&[gain.clone(), path, of("the contact", Cause::Drift, 0.1)]);
+        assert_eq!((check.name.as_str(), check.ok), (AS_STATED, Some(false)));
+        assert_eq!(
+            super::super::brief::failed(&check),
+            "Not as the plan states: the gain of the vibrometer on A's spot; a second path beside the contact."
+        );
+        let told = check.meaning.clone();
+        assert!(told.contains("4.3 %") && told.contains("2.8 N/µm") && !told.contains("changed"), "{told}");
+        assert_eq!(as_stated(&[]).ok, Some(true));
     }
 
     #[test]
