@@ -98,7 +98,7 @@ pub struct Start {
 
 /// Finds the most likely parameters, with the noise that they leave: the best of the minima that
 /// the searches from these starts reach. Residuals of a cell beyond its noise are counted as noise
-/// of that cell.
+/// of that cell. The uncertainty contains that the truth may be at another of these minima.
 ///
 /// # Errors
 /// [`ContactError::NotIdentified`] if the rows do not determine the motion or the parameters, or no
@@ -112,6 +112,8 @@ pub fn solve(
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
     let searched: Vec<Result<Minimum, ContactError>> =
         starts.par_iter().map(|start| search(blocks, parameters, start, shared)).collect();
+    let reached: Vec<(f64, Vec<f64>)> =
+        searched.iter().flatten().map(|found| (found.cost, found.place.p.clone())).collect();
     let mut refused = None;
     let mut best: Option<Minimum> = None;
     for found in searched {
@@ -121,11 +123,27 @@ pub fn solve(
             Err(error) => refused = Some(refused.unwrap_or(error)),
         }
     }
-    let Minimum { blocks, place: here, .. } = best.ok_or_else(|| refused.unwrap_or_else(not_converged))?;
+    let Minimum { blocks, place: here, cost } = best.ok_or_else(|| refused.unwrap_or_else(not_converged))?;
     let (information, _) = Posterior { blocks: &blocks, parameters, shared }.normal(&here);
-    let certainty = certainty(&blocks, &here.bins, &here.p, &information, shared)?;
+    let mut certainty = certainty(&blocks, &here.bins, &here.p, &information, shared)?;
+    if let Some((weight, way)) = other_minimum(cost, &here.p, &reached) {
+        certainty.covariance += &way * way.transpose() * weight;
+    }
     let chi_square = per_freedom(&here.bins);
     Ok((blocks, Solution { p: here.p, certainty, bins: here.bins, shared, chi_square }))
+}
+
+/// Of the other minima that are reached, each with its cost, the one where the compliance deviates
+/// most on average: the probability that the truth is there rather than at the best minimum `p`, by
+/// the costs, and the way there. `None` if there is no other minimum.
+fn other_minimum(cost: f64, p: &[f64], reached: &[(f64, Vec<f64>)]) -> Option<(f64, DVector<f64>)> {
+    let of = |(other, there): &(f64, Vec<f64>)| {
+        let way = DVector::from_iterator(p.len(), there.iter().zip(p).map(|(there, here)| there - here));
+        ((1.0 + (other - cost).exp()).recip(), way)
+    };
+    let effect = |(weight, way): &(f64, DVector<f64>)| weight * way[COMPLIANCE].powi(2);
+    let all = reached.iter().map(of).filter(|one| effect(one) > 0.0);
+    all.max_by(|a, b| effect(a).total_cmp(&effect(b)))
 }
 
 /// The end of a search, with its noise.
@@ -670,7 +688,21 @@ fn excess(seen: &[Seen], allowed: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::part_of_signal;
+    use super::{other_minimum, part_of_signal};
+
+    #[test]
+    fn a_minimum_counts_as_likely_as_its_cost_says() {
+        let place = |compliance: f64| vec![compliance, 3.0 * compliance];
+        let here = place(1.0);
+        assert_eq!(other_minimum(5.0, &here, &[(5.0, place(1.0))]), None);
+        // as likely as the best minimum, and one that is farther but hardly possible
+        let all = [(5.0, place(1.0)), (5.0, place(1.5)), (35.0, place(3.0))];
+        let (weight, way) = other_minimum(5.0, &here, &all).expect("another minimum");
+        assert_eq!((weight, way.as_slice()), (0.5, [0.5, 1.5].as_slice()));
+        // e times less likely
+        let (weight, _) = other_minimum(5.0, &here, &[(6.0, place(1.5))]).expect("another minimum");
+        assert!((weight - 1.0 / (1.0 + 1.0_f64.exp())).abs() < 1e-12, "{weight}");
+    }
 
     #[test]
     fn what_is_left_in_proportion_to_the_signal_is_found() {
