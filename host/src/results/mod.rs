@@ -10,7 +10,7 @@
 //! the modes; `wear`: the wear runs.
 
 use crate::campaign::store::SimulatedTruth;
-use crate::contact::{Contradiction, Diagnosis, Doubt, Interval, OfFrequency};
+use crate::contact::{Contradiction, Diagnosis, Doubt, HeldOut, Interval, OfFrequency};
 use crate::substructuring::Band;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -218,6 +218,9 @@ pub struct ContactAnswer {
     /// k_T bin by bin.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub of_frequency: Vec<OfFrequency>,
+    /// Cells of the assembly predicted without their own signals.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub held_out: Vec<HeldOut>,
     /// How well the assumptions are satisfied.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Diagnosis>,
@@ -276,6 +279,8 @@ pub const HIDDEN_RESONANCE: &str = "hidden-resonance";
 pub const HAMMER_SLIP: &str = "hammer-slip";
 /// Name of the check that the contact is the same in all hits.
 pub const STEADY: &str = "contact-steady";
+/// Name of the check that the fit of the contact predicts cells that it has not seen.
+pub const PREDICTED: &str = "cells-predicted";
 /// Name of the check that the data do not contradict what the plan states.
 pub const AS_STATED: &str = "plan-as-stated";
 /// Name of the check on wear.

@@ -102,12 +102,13 @@ struct Update<'a> {
 }
 
 impl Posterior {
-    fn of(certainty: &Certainty, row: DVector<f64>) -> Self {
+    pub(super) fn of(certainty: &Certainty, row: DVector<f64>) -> Self {
         let inverse = 2.0 * &certainty.answer;
         Posterior { of_noise: 2.0 * &certainty.covariance - &inverse, inverse, row }
     }
 
-    fn certainty(&self) -> Certainty {
+    /// The parameters' uncertainty.
+    pub(super) fn certainty(&self) -> Certainty {
         Certainty { answer: 0.5 * &self.inverse, covariance: 0.5 * (&self.inverse + &self.of_noise) }
     }
 

@@ -48,6 +48,7 @@ mod fixed_tests;
 mod forecast;
 #[cfg(test)]
 mod forecast_tests;
+mod held_out;
 mod known_mass;
 mod levels;
 #[cfg(test)]
@@ -64,6 +65,7 @@ pub use block::{Axes, ContactCell, PlannedCell, SIGMA_PER_S, determines_motion};
 pub use contradictions::Contradiction;
 pub use elastic::Bulk;
 pub use forecast::{Forecast, ForecastCell, forecast};
+pub use held_out::HeldOut;
 pub use known_mass::{KnownMass, mass_ratio};
 pub use levels::{
     Joint, LEVEL_LINES, LevelError, LevelStiffness, Shares, SteadyLevel, joint, level_stiffness,
@@ -243,7 +245,8 @@ impl Known {
 /// # Errors
 /// As [`stiffness`].
 pub fn read(input: &Input<'_>) -> Result<(Stiffness, Known), ContactError> {
-    let (found, fit) = fitted(input)?;
+    let (mut found, fit) = fitted(input)?;
+    found.held_out = held_out::held_out(&fit);
     let Fit { parameters, solution, .. } = fit;
     let Solution { p, certainty, chi_square, .. } = solution;
     Ok((found, Known { p, parameters, certainty, misfit: chi_square.max(1.0) }))

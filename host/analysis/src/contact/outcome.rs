@@ -13,7 +13,7 @@ use super::block::Block;
 use super::contradictions::{self, Changes, Contradiction, Worst};
 use super::parameters::{COMPLIANCE, Cause, FORM, HAMMER, MASS_ERROR, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
-use super::{ContactError, Fit, Input, SecondPath};
+use super::{ContactError, Fit, HeldOut, Input, SecondPath};
 use crate::band::Band;
 use crate::hysteresis::contact_drift::ContactDrift;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
@@ -59,6 +59,8 @@ pub struct Stiffness {
     pub doubts: Vec<Doubt>,
     /// χ² per degree of freedom over all signals.
     pub chi_square: f64,
+    /// Cells predicted without their own signals.
+    pub held_out: Vec<HeldOut>,
 }
 
 /// Assembles the result of a fit with these changes of the priors.
@@ -114,6 +116,7 @@ pub fn of(input: &Input<'_>, fit: &Fit, changes: &Changes) -> Result<Stiffness, 
         doubts,
         diagnosis,
         chi_square: solution.chi_square,
+        held_out: Vec::new(),
     })
 }
 

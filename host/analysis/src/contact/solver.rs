@@ -482,7 +482,7 @@ fn bin(
 
 /// The motion that a shift of the impact by one metre along each of two axes adds at a line; `None`
 /// if it is not known.
-fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Complex<f64>>; 2]> {
+pub fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Complex<f64>>; 2]> {
     (!block.shifted_by.is_empty()).then(|| {
         [0, 1].map(|axis| {
             let mut shift = DVector::zeros(block.latent());
@@ -496,14 +496,32 @@ fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Comple
     })
 }
 
-/// Information of all lines of a block, over its parameters; `None` if its rows do not determine
-/// the motion.
-pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
+/// Normal equations of all lines of a block; `None` if its rows do not determine the motion.
+pub fn normal(block: &Block, motion: &Motion, p: &[f64]) -> Option<Normal> {
     let mut normal = Normal::none(block.parameters.len());
     for line in 0..block.lines.len() {
         normal.add(block, line, p, shifts(block, motion, line).as_ref())?;
     }
-    Some(normal.information / shared)
+    Some(normal)
+}
+
+/// Information of all lines of a block, over its parameters; `None` if its rows do not determine
+/// the motion.
+pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
+    Some(normal(block, motion, p)?.information / shared)
+}
+
+/// The block without the weight of one cell.
+pub fn without(block: &Block, cell: usize) -> Block {
+    let mut rest = block.clone();
+    for line in &mut rest.lines {
+        for (weight, row) in line.weight.iter_mut().zip(&rest.rows) {
+            if row.cell == cell {
+                *weight = 0.0;
+            }
+        }
+    }
+    rest
 }
 
 /// The best-fitting motion of each line, by block.

@@ -2,7 +2,7 @@
 //! contact by loops.
 
 use crate::analyse::{Contact, Findings, ImpactLoops, RecordLoops, Row, SlopeIs, Substructured};
-use crate::contact::{self, Interval, Stiffness};
+use crate::contact::{self, HeldOut, Interval, Stiffness};
 use crate::hysteresis::{Kind, LoopAnalysis, OverCycles};
 use crate::report::words::check_sentences::hammer_slip;
 use crate::report::words::{answer_sentences as say, level_sentences, warning_sentences};
@@ -164,9 +164,24 @@ fn of_stiffness(own: &Stiffness, joint: Option<&contact::Joint>, slips: bool) ->
             _ => say::doubted(own),
         },
         of_frequency: if trusted { own.of_frequency.clone() } else { Vec::new() },
+        held_out: own.held_out.iter().map(shortened).collect(),
         diagnosis: Some(own.diagnosis.clone()),
         contradictions: own.contradictions.clone(),
         doubts: own.doubts.clone(),
+    }
+}
+
+/// The same with the digits that matter.
+fn shortened(one: &HeldOut) -> HeldOut {
+    let short = |all: &[f64]| all.iter().map(|value| rounded(*value, DIGITS)).collect();
+    HeldOut {
+        frequency_hz: short(&one.frequency_hz),
+        measured_m_per_n: short(&one.measured_m_per_n),
+        predicted_m_per_n: short(&one.predicted_m_per_n),
+        half_width_m_per_n: short(&one.half_width_m_per_n),
+        deviation: rounded(one.deviation, NOISE_DIGITS),
+        part: rounded(one.part, NOISE_DIGITS),
+        ..one.clone()
     }
 }
 
@@ -179,6 +194,7 @@ fn unknown(why: String) -> ContactAnswer {
         budget: std::collections::BTreeMap::new(),
         why,
         of_frequency: Vec::new(),
+        held_out: Vec::new(),
         diagnosis: None,
         contradictions: Vec::new(),
         doubts: Vec::new(),

@@ -11,6 +11,7 @@ mod cells;
 mod comparison;
 mod consistency;
 mod contact_loop;
+mod held_out;
 mod joint_spectrum;
 mod levels;
 mod modes;
@@ -76,6 +77,12 @@ pub const ALL: &[Entry] = &[
     entry(Chapter::Answer, "The answer", "an identified stiffness", answer::answer),
     entry(Chapter::SideBySide, "Every method side by side", ALL_THREE, comparison::comparison),
     entry(Chapter::SideBySide, "What makes the interval of k_T", "an identified k_T", budget::budget),
+    entry(
+        Chapter::SideBySide,
+        "Cells predicted from the others",
+        "an identified k_T, with four points on specimen A",
+        held_out::held_out,
+    ),
     entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, cells::of_results),
     entry(Chapter::Measured, "Every cell", CAMPAIGN, cells::cells),
     entry(Chapter::Measured, "Coherence of every cell", "two hits or more in a cell", noise_floor::coherence),

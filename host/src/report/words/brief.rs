@@ -10,7 +10,8 @@ use crate::campaign::store::session_table::SessionInfo;
 use crate::contact::Interval;
 use crate::results::{
     AS_STATED, BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS, Joint,
-    ONE_STRUCTURE, Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED, headline_rank,
+    ONE_STRUCTURE, PREDICTED, Results, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED,
+    headline_rank,
 };
 use crate::substructuring::{Dof, fit};
 
@@ -114,6 +115,7 @@ pub fn failed(check: &Check) -> String {
                 .into()
         }
         STEADY => "The contact changed while it was hit: k_T is a mean over that time.".into(),
+        PREDICTED => "The fit of the contact does not predict a cell that was left out of it.".into(),
         // its first sentence names what is off
         AS_STATED => format!("{}.", check.meaning.split(". ").next().unwrap_or_default()),
         UNCHANGED => "The contact is not the same after the hits as before.".into(),

@@ -8,14 +8,14 @@ use crate::analyse::checks::{
     BackCoupled, HiddenResonance, InternalsFound, Reach, SameStructures, Sameness, SensorMasses,
     SeriesCompliance, Sizes, rigid_motions_suffice,
 };
-use crate::contact::{Cause, Contradiction};
+use crate::contact::{Cause, Contradiction, HeldOut};
 use crate::hysteresis::compliance::ImaginaryPeak;
 use crate::hysteresis::contact_drift::ContactDrift;
 use crate::hysteresis::hammer_slip::{HammerSlip, Unclear};
 use crate::hysteresis::phase_split::{PhaseSplit, Specimen};
 use crate::results::{
     AS_STATED, BACK_COUPLING, Check, HAMMER_SLIP, HIDDEN_RESONANCE, INTERFACE_MODES, INTERNALS,
-    ONE_STRUCTURE, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED,
+    ONE_STRUCTURE, PREDICTED, SAME_IN_ALL, SENSOR_MASSES, SERIES_COMPLIANCE, STEADY, UNCHANGED,
 };
 use crate::substructuring::cmif::Cmif;
 use crate::substructuring::explained::BEYOND;
@@ -34,6 +34,7 @@ pub fn all(found: &Findings) -> Vec<Check> {
     }
     if let Some(Ok(own)) = &found.own_stiffness {
         checks.push(as_stated(&own.contradictions));
+        checks.extend(predicted(&own.held_out));
     }
     if let Some(contact) = &found.contact {
         checks.push(series_compliance(&contact.series));
@@ -379,6 +380,41 @@ fn as_stated(all: &[Contradiction]) -> Check {
         AS_STATED,
         Some(false),
         format!("Not as the plan states: {}. {}", names.join("; "), told.join(" ")),
+    )
+}
+
+/// Standard deviations, as an rms over a cell's axes and lines, by which a predicted cell may be
+/// off. A few errors, such as an aim, move all its lines together, so that this scatters more than
+/// an rms of independent differences.
+const PREDICTED_WITHIN: f64 = 3.0;
+
+/// Whether cells that the fit of the contact has not seen are as it predicts them.
+fn predicted(all: &[HeldOut]) -> Option<Check> {
+    let worst = all.iter().max_by(|a, b| a.deviation.total_cmp(&b.deviation))?;
+    let HeldOut { impact, point, deviation, part, .. } = worst;
+    let largest = all.iter().map(|one| one.part).fold(0.0, f64::max);
+    let off = format!(
+        "{impact} × {point} is off by {} %, {} times what noise, aims and places explain",
+        decimals(100.0 * part, 2),
+        decimals(*deviation, 1)
+    );
+    let ok = *deviation < PREDICTED_WITHIN;
+    let meaning = if ok {
+        format!(
+            "The fit of the contact predicts cells that were left out of it ({} of them) within {} % of their signals: {off}.",
+            all.len(),
+            decimals(100.0 * largest, 2)
+        )
+    } else {
+        format!(
+            "The fit of the contact does not predict a cell that was left out of it: {off}. Look at its hits and its place; if they are right, the bodies are \
+             not as the model has them."
+        )
+    };
+    Some(
+        Check::new(PREDICTED, Some(ok), meaning)
+            .with("worst_deviation", *deviation)
+            .with("worst_part", *part),
     )
 }
 
