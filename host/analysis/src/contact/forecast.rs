@@ -102,13 +102,12 @@ struct Update<'a> {
 }
 
 impl Posterior {
-    pub(super) fn of(certainty: &Certainty, row: DVector<f64>) -> Self {
+    fn of(certainty: &Certainty, row: DVector<f64>) -> Self {
         let inverse = 2.0 * &certainty.answer;
         Posterior { of_noise: 2.0 * &certainty.covariance - &inverse, inverse, row }
     }
 
-    /// The parameters' uncertainty.
-    pub(super) fn certainty(&self) -> Certainty {
+    fn certainty(&self) -> Certainty {
         Certainty { answer: 0.5 * &self.inverse, covariance: 0.5 * (&self.inverse + &self.of_noise) }
     }
 

@@ -1,18 +1,15 @@
 //! Prediction of a cell that the fit has not seen: the model's test on data that it was not fitted
 //! to.
 //!
-//! The cell's signals are given no weight. Its impact's gradient then changes, and one Newton step
-//! with the curvature that remains gives the parameters without the cell: nothing is fitted again.
-//! The other cells of the impact give the motion, and motion and parameters the cell's signals. The
-//! variance of the difference is that of the cell's noise, of the motion, and of the parameters, the
-//! cell's own errors of aim among them.
+//! The cell's signals are given no weight, and the rest is fitted again from the present minimum.
+//! The other cells of the impact then give the motion, and motion and parameters the cell's signals.
+//! The variance of the difference is that of the cell's noise, of the motion, and of the parameters,
+//! the cell's own errors of aim among them.
 
 use super::Fit;
 use super::block::{Block, Group, POINT};
-use super::forecast::Posterior;
 use super::model::{Eliminated, LineModel, eliminated};
-use super::outcome::of_contact;
-use super::solver::{Motion, motions, normal, shifts, without};
+use super::solver::{Refit, refit, shifts, without};
 use crate::C;
 use crate::parallel::prelude::*;
 use crate::substructuring::joint_over_bands::NORMAL_95;
@@ -49,7 +46,6 @@ const VAGUE: f64 = 0.3;
 /// Predicts one cell on specimen A for each impact on the assembly, not the same point for all. A
 /// cell that the others do not determine is left out.
 pub fn held_out(fit: &Fit) -> Vec<HeldOut> {
-    let motion = motions(&fit.blocks, &fit.solution.bins);
     let assembled =
         fit.blocks.iter().enumerate().filter(|(_, block)| block.along_z.is_none() && block.counts);
     let chosen: Vec<(usize, usize)> = assembled
@@ -60,30 +56,15 @@ pub fn held_out(fit: &Fit) -> Vec<HeldOut> {
             Some((b, *own.get(n % own.len().max(1))?))
         })
         .collect();
-    chosen.into_par_iter().filter_map(|(b, cell)| predicted(fit, &motion, b, cell)).collect()
+    chosen.into_par_iter().filter_map(|(b, cell)| predicted(fit, b, cell)).collect()
 }
 
-fn predicted(fit: &Fit, motion: &Motion, b: usize, cell: usize) -> Option<HeldOut> {
-    let solution = &fit.solution;
-    let whole = &fit.blocks[b];
-    let rest = without(whole, cell);
-    let [before, after] = [whole, &rest].map(|block| normal(block, motion, &solution.p));
-    let (before, after) = (before?, after?);
-    let change = (&after.information - &before.information) / solution.shared;
-    let gradient = (&after.gradient - &before.gradient) / solution.shared;
-
-    let (_, row) = of_contact(&solution.p);
-    let mut posterior = Posterior::of(&solution.certainty, row);
-    if !posterior.change(&rest.parameters, &change) {
-        return None;
-    }
-    let inverse = &posterior.inverse;
-    let covariance = posterior.certainty().covariance;
-    let mut p = solution.p.clone();
-    for (i, value) in p.iter_mut().enumerate() {
-        let own = rest.parameters.iter().zip(gradient.iter());
-        *value -= own.map(|(at, gradient)| inverse[(i, *at)] * gradient).sum::<f64>();
-    }
+fn predicted(fit: &Fit, b: usize, cell: usize) -> Option<HeldOut> {
+    let mut blocks = fit.blocks.clone();
+    blocks[b] = without(&fit.blocks[b], cell);
+    let Refit { p, covariance, motion } =
+        refit(&blocks, &fit.parameters, fit.solution.shared, &fit.solution.p).ok()?;
+    let rest = &blocks[b];
     let at = &rest.parameters;
     let covariance = DMatrix::from_fn(at.len(), at.len(), |i, j| covariance[(at[i], at[j])]);
 
@@ -91,7 +72,7 @@ fn predicted(fit: &Fit, motion: &Motion, b: usize, cell: usize) -> Option<HeldOu
         .filter(|r| rest.rows[*r].cell == cell && rest.rows[*r].channel >= POINT)
         .collect();
     let lines = (0..rest.lines.len())
-        .map(|line| Line::of(&rest, line, &p, shifts(&rest, motion, line).as_ref(), &rows, &covariance))
+        .map(|line| Line::of(rest, line, &p, shifts(rest, &motion, line).as_ref(), &rows, &covariance))
         .collect::<Option<Vec<Line>>>()?;
     let mean = |of: &dyn Fn(&Compared) -> f64| {
         let all = lines.iter().flat_map(|line| &line.rows).map(of);

@@ -213,6 +213,37 @@ fn normalisation(block: &Block, bin: &Bin) -> f64 {
     if block.counts { bin.residuals.iter().map(of_line).sum() } else { 0.0 }
 }
 
+/// The fit of changed blocks with the current noise.
+pub struct Refit {
+    /// The parameters.
+    pub p: Vec<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// The motion at every line.
+    pub motion: Motion,
+}
+
+/// Fits the blocks again, from parameters near the minimum.
+///
+/// # Errors
+/// As [`solve`].
+pub fn refit(
+    blocks: &[Block],
+    parameters: &Parameters,
+    shared: f64,
+    p: &[f64],
+) -> Result<Refit, ContactError> {
+    let motion = motions(blocks, &evaluate(blocks, p, None)?);
+    let posterior = Posterior { blocks, parameters, shared };
+    let (here, settled) = posterior.settle(p.to_vec(), motion, Widening::Begun)?;
+    if !settled {
+        return Err(not_converged());
+    }
+    let (information, _) = posterior.normal(&here);
+    let covariance = certainty(blocks, &here.bins, &here.p, &information, shared)?.covariance;
+    Ok(Refit { motion: motions(blocks, &here.bins), covariance, p: here.p })
+}
+
 /// End of a search from `p` with the current noise, and whether it converged.
 #[cfg(test)]
 pub fn settled_from(
@@ -496,19 +527,14 @@ pub fn shifts(block: &Block, motion: &Motion, line: usize) -> Option<[DVector<Co
     })
 }
 
-/// Normal equations of all lines of a block; `None` if its rows do not determine the motion.
-pub fn normal(block: &Block, motion: &Motion, p: &[f64]) -> Option<Normal> {
+/// Information of all lines of a block, over its parameters; `None` if its rows do not determine
+/// the motion.
+pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
     let mut normal = Normal::none(block.parameters.len());
     for line in 0..block.lines.len() {
         normal.add(block, line, p, shifts(block, motion, line).as_ref())?;
     }
-    Some(normal)
-}
-
-/// Information of all lines of a block, over its parameters; `None` if its rows do not determine
-/// the motion.
-pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Option<DMatrix<f64>> {
-    Some(normal(block, motion, p)?.information / shared)
+    Some(normal.information / shared)
 }
 
 /// The block without the weight of one cell.
