@@ -31,8 +31,11 @@ pub struct HeldOut {
     pub measured_m_per_n: Vec<f64>,
     /// Magnitudes of the predicted receptance, m/N.
     pub predicted_m_per_n: Vec<f64>,
-    /// Half widths of the predicted magnitude's 95 % interval, for noise, aims and places, m/N.
-    pub half_width_m_per_n: Vec<f64>,
+    /// Measured over predicted magnitude, minus 1.
+    pub off: Vec<f64>,
+    /// Half widths of the predicted magnitude's 95 % interval for noise, aims and places, relative
+    /// to it.
+    pub half_width: Vec<f64>,
     /// Rms of the complex difference over its standard deviation, over all axes and lines: about 1
     /// if the model holds.
     pub deviation: f64,
@@ -44,7 +47,7 @@ pub struct HeldOut {
 const VAGUE: f64 = 0.3;
 
 /// Predicts one cell on specimen A for each impact on the assembly, not the same point for all. A
-/// cell that the others do not determine is left out.
+/// cell without which the fit is not determined is left out.
 pub fn held_out(fit: &Fit) -> Vec<HeldOut> {
     let assembled =
         fit.blocks.iter().enumerate().filter(|(_, block)| block.along_z.is_none() && block.counts);
@@ -92,8 +95,9 @@ fn predicted(fit: &Fit, b: usize, cell: usize) -> Option<HeldOut> {
         frequency_hz: rest.lines.iter().map(|line| line.frequency_hz).collect(),
         measured_m_per_n: of_axis(|one| one.measured.norm()),
         predicted_m_per_n: of_axis(|one| one.predicted.norm()),
+        off: of_axis(|one| one.measured.norm() / one.predicted.norm() - 1.0),
         // a magnitude has one of the two parts of a complex difference
-        half_width_m_per_n: of_axis(|one| NORMAL_95 * (0.5 * one.variance).sqrt()),
+        half_width: of_axis(|one| NORMAL_95 * (0.5 * one.variance).sqrt() / one.predicted.norm()),
         deviation: mean(&|one| one.off() / one.variance).sqrt(),
         part: (mean(&Compared::off) / signal).sqrt(),
     })
@@ -182,10 +186,7 @@ mod tests {
             // some hundred independent differences: their rms scatters by some per cent
             assert!((0.8..1.25).contains(&one.deviation), "{one:?}");
             let lines = one.frequency_hz.len();
-            let inside = (0..lines).filter(|line| {
-                (one.measured_m_per_n[*line] - one.predicted_m_per_n[*line]).abs()
-                    < one.half_width_m_per_n[*line]
-            });
+            let inside = (0..lines).filter(|line| one.off[*line].abs() < one.half_width[*line]);
             let inside = inside.count() as f64 / lines as f64;
             assert!(lines > 20 && inside > 0.87, "{inside} of {lines}");
         }

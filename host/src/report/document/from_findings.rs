@@ -178,7 +178,8 @@ fn shortened(one: &HeldOut) -> HeldOut {
         frequency_hz: short(&one.frequency_hz),
         measured_m_per_n: short(&one.measured_m_per_n),
         predicted_m_per_n: short(&one.predicted_m_per_n),
-        half_width_m_per_n: short(&one.half_width_m_per_n),
+        off: short(&one.off),
+        half_width: short(&one.half_width),
         deviation: rounded(one.deviation, NOISE_DIGITS),
         part: rounded(one.part, NOISE_DIGITS),
         ..one.clone()
