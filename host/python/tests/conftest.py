@@ -41,7 +41,10 @@ def plan_of_one_place(path: Path, changes: list[tuple[str, str]]) -> Path:
 
 
 def short_contact_plan(path: Path) -> Path:
-    """The plan for a contact's own stiffness with fewer cells, without the open joint, two hits in each, of one second: HITS in all."""
+    """The plan for a contact's own stiffness with fewer cells and without the open joint.
+
+    Two hits of one second in each cell: HITS in all.
+    """
     command("plan", "new", path, "--template", "contact")
     text = path.read_text()
     text = re.sub(r'impacts = \["BZ1".*\]', 'impacts = ["BZ1", "BZ2", "BZ3"]', text)

@@ -2,14 +2,14 @@
 //! to.
 //!
 //! The cell's signals are given no weight, and the rest is fitted again from the present minimum.
-//! The other cells of the impact then give the motion, and motion and parameters the cell's signals.
-//! The variance of the difference is that of the cell's noise, of the motion, and of the parameters,
-//! the cell's own errors of aim among them.
+//! The other cells of the impact then give the motion; motion and parameters give the cell's
+//! signals. The variance of the difference is that of the cell's noise, of the motion, and of the
+//! parameters, among them the cell's own errors of aim.
 
 use super::Fit;
 use super::block::{Block, Group, POINT};
 use super::model::{Eliminated, LineModel, eliminated};
-use super::solver::{Refit, refit, shifts, without};
+use super::solver::{Refit, refit, shifts};
 use crate::C;
 use crate::parallel::prelude::*;
 use crate::substructuring::joint_over_bands::NORMAL_95;
@@ -64,7 +64,13 @@ pub fn held_out(fit: &Fit) -> Vec<HeldOut> {
 
 fn predicted(fit: &Fit, b: usize, cell: usize) -> Option<HeldOut> {
     let mut blocks = fit.blocks.clone();
-    blocks[b] = without(&fit.blocks[b], cell);
+    for line in &mut blocks[b].lines {
+        for (weight, row) in line.weight.iter_mut().zip(&fit.blocks[b].rows) {
+            if row.cell == cell {
+                *weight = 0.0;
+            }
+        }
+    }
     let Refit { p, covariance, motion } =
         refit(&blocks, &fit.parameters, fit.solution.shared, &fit.solution.p).ok()?;
     let rest = &blocks[b];
@@ -75,19 +81,19 @@ fn predicted(fit: &Fit, b: usize, cell: usize) -> Option<HeldOut> {
         .filter(|r| rest.rows[*r].cell == cell && rest.rows[*r].channel >= POINT)
         .collect();
     let lines = (0..rest.lines.len())
-        .map(|line| Line::of(rest, line, &p, shifts(rest, &motion, line).as_ref(), &rows, &covariance))
-        .collect::<Option<Vec<Line>>>()?;
+        .map(|line| compared(rest, line, &p, shifts(rest, &motion, line).as_ref(), &rows, &covariance))
+        .collect::<Option<Vec<Vec<Compared>>>>()?;
     let mean = |of: &dyn Fn(&Compared) -> f64| {
-        let all = lines.iter().flat_map(|line| &line.rows).map(of);
+        let all = lines.iter().flatten().map(of);
         all.sum::<f64>() / (rows.len() * lines.len()).max(1) as f64
     };
     let signal = mean(&|one| one.measured.norm_sqr());
     if lines.is_empty() || mean(&|one| one.variance) > VAGUE * VAGUE * signal {
         return None;
     }
-    let moves = |axis: usize| lines.iter().map(|line| line.rows[axis].measured.norm_sqr()).sum::<f64>();
+    let moves = |axis: usize| lines.iter().map(|line| line[axis].measured.norm_sqr()).sum::<f64>();
     let axis = (0..rows.len()).max_by(|a, b| moves(*a).total_cmp(&moves(*b)))?;
-    let of_axis = |of: fn(&Compared) -> f64| lines.iter().map(|line| of(&line.rows[axis])).collect();
+    let of_axis = |of: fn(&Compared) -> f64| lines.iter().map(|line| of(&line[axis])).collect();
     Some(HeldOut {
         impact: rest.impact.clone(),
         point: rest.cells[cell].name.clone(),
@@ -116,59 +122,52 @@ impl Compared {
     }
 }
 
-/// The predicted rows of one line.
-struct Line {
-    rows: Vec<Compared>,
-}
-
-impl Line {
-    /// The prediction of `rows`, which have no weight in the block.
-    fn of(
-        block: &Block,
-        line: usize,
-        p: &[f64],
-        shifts: Option<&[DVector<C>; 2]>,
-        rows: &[usize],
-        covariance: &DMatrix<f64>,
-    ) -> Option<Self> {
-        let at = &block.lines[line];
-        let model = LineModel::new(block, p, at.s);
-        let (map, offsets) = model.map();
-        let Eliminated { q, r, motion, .. } = eliminated(block, at, &map, &offsets, p, shifts)?;
-        // columns: what a unit of noise in each combination of the weighted signals adds to the motion
-        let of_noise = r.solve_upper_triangular(&DMatrix::identity(r.nrows(), r.ncols()))?;
-        let derivatives = model.derivatives(&motion, shifts, &map);
-        let parameters = covariance.nrows();
-        // Qᴴ times the weighted derivatives: how far the motion follows the parameters
-        let mut followed = DMatrix::<C>::zeros(q.ncols(), parameters);
-        for (k, own) in derivatives.iter().enumerate() {
-            for (i, value) in own {
-                let value = value * at.weight[k];
-                for n in 0..q.ncols() {
-                    followed[(n, *i)] += q[(k, n)].conj() * value;
-                }
+/// The prediction of `rows`, which have no weight in the block, at one line.
+fn compared(
+    block: &Block,
+    line: usize,
+    p: &[f64],
+    shifts: Option<&[DVector<C>; 2]>,
+    rows: &[usize],
+    covariance: &DMatrix<f64>,
+) -> Option<Vec<Compared>> {
+    let at = &block.lines[line];
+    let model = LineModel::new(block, p, at.s);
+    let (map, offsets) = model.map();
+    let Eliminated { q, r, motion, .. } = eliminated(block, at, &map, &offsets, p, shifts)?;
+    // each column: what unit noise in one combination of the weighted signals adds to the motion
+    let of_noise = r.solve_upper_triangular(&DMatrix::identity(r.nrows(), r.ncols()))?;
+    let derivatives = model.derivatives(&motion, shifts, &map);
+    let parameters = covariance.nrows();
+    // Qᴴ times the weighted derivatives: how far the motion follows the parameters
+    let mut followed = DMatrix::<C>::zeros(q.ncols(), parameters);
+    for (k, own) in derivatives.iter().enumerate() {
+        for (i, value) in own {
+            let value = value * at.weight[k];
+            for n in 0..q.ncols() {
+                followed[(n, *i)] += q[(k, n)].conj() * value;
             }
         }
-        let compared = rows.iter().map(|&row| {
-            let of_motion = map.row(row) * &of_noise;
-            let mut slopes = -(&of_motion * &followed);
-            for (i, value) in &derivatives[row] {
-                slopes[*i] += value;
-            }
-            let [re, im] = [slopes.map(|slope| slope.re), slopes.map(|slope| slope.im)];
-            let of_parameters = (&re * covariance).dot(&re) + (&im * covariance).dot(&im);
-            let mut predicted = (map.row(row) * &motion)[0] + offsets[row];
-            if let (Some(shifts), Some(at)) = (shifts, block.cells[block.rows[row].cell].shift) {
-                predicted += (0..2).map(|axis| (map.row(row) * &shifts[axis])[0] * p[at + axis]).sum::<C>();
-            }
-            Compared {
-                measured: at.value[row],
-                predicted,
-                variance: at.sigma[row].powi(2) + of_motion.norm_squared() + of_parameters,
-            }
-        });
-        Some(Line { rows: compared.collect() })
     }
+    let compared = rows.iter().map(|&row| {
+        let of_motion = map.row(row) * &of_noise;
+        let mut slopes = -(&of_motion * &followed);
+        for (i, value) in &derivatives[row] {
+            slopes[*i] += value;
+        }
+        let [re, im] = [slopes.map(|slope| slope.re), slopes.map(|slope| slope.im)];
+        let of_parameters = (&re * covariance).dot(&re) + (&im * covariance).dot(&im);
+        let mut predicted = (map.row(row) * &motion)[0] + offsets[row];
+        if let (Some(shifts), Some(at)) = (shifts, block.cells[block.rows[row].cell].shift) {
+            predicted += (0..2).map(|axis| (map.row(row) * &shifts[axis])[0] * p[at + axis]).sum::<C>();
+        }
+        Compared {
+            measured: at.value[row],
+            predicted,
+            variance: at.sigma[row].powi(2) + of_motion.norm_squared() + of_parameters,
+        }
+    });
+    Some(compared.collect())
 }
 
 #[cfg(test)]

@@ -203,7 +203,7 @@ impl ContactError {
 /// # Errors
 /// [`ContactError`] if cells are missing or the data do not determine the contact.
 pub fn stiffness(input: &Input<'_>) -> Result<Stiffness, ContactError> {
-    read(input).map(|(found, _)| found)
+    fitted(input).map(|(found, _)| found)
 }
 
 /// All parameters as fitted to the hits, for the correction of the shaker's levels.
@@ -240,7 +240,7 @@ impl Known {
     }
 }
 
-/// As [`stiffness`], with all other results of the fit.
+/// As [`stiffness`], with all other results of the fit and the cells that it predicts.
 ///
 /// # Errors
 /// As [`stiffness`].

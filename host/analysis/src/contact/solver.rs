@@ -133,9 +133,9 @@ pub fn solve(
     Ok((blocks, Solution { p: here.p, certainty, bins: here.bins, shared, chi_square }))
 }
 
-/// Of the other minima that are reached, each with its cost, the one where the compliance deviates
-/// most on average: the probability that the truth is there rather than at the best minimum `p`, by
-/// the costs, and the way there. `None` if there is no other minimum.
+/// Of the minima that are reached, each with its cost, the one that adds most to the variance of the
+/// compliance at the best minimum `p`: the probability that the truth is there and not at `p`, which
+/// follows from the costs, and the difference of the parameters. `None` if all searches end at `p`.
 fn other_minimum(cost: f64, p: &[f64], reached: &[(f64, Vec<f64>)]) -> Option<(f64, DVector<f64>)> {
     let of = |(other, there): &(f64, Vec<f64>)| {
         let way = DVector::from_iterator(p.len(), there.iter().zip(p).map(|(there, here)| there - here));
@@ -242,21 +242,6 @@ pub fn refit(
     let (information, _) = posterior.normal(&here);
     let covariance = certainty(blocks, &here.bins, &here.p, &information, shared)?.covariance;
     Ok(Refit { motion: motions(blocks, &here.bins), covariance, p: here.p })
-}
-
-/// End of a search from `p` with the current noise, and whether it converged.
-#[cfg(test)]
-pub fn settled_from(
-    blocks: &[Block],
-    parameters: &Parameters,
-    sigma_per_s: f64,
-    p: Vec<f64>,
-) -> Result<(Vec<f64>, bool), ContactError> {
-    let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
-    let motion = motions(blocks, &evaluate(blocks, &p, None)?);
-    Posterior { blocks, parameters, shared }
-        .settle(p, motion, Widening::Begun)
-        .map(|(place, settled)| (place.p, settled))
 }
 
 impl Posterior<'_> {
@@ -535,19 +520,6 @@ pub fn information(block: &Block, motion: &Motion, p: &[f64], shared: f64) -> Op
         normal.add(block, line, p, shifts(block, motion, line).as_ref())?;
     }
     Some(normal.information / shared)
-}
-
-/// The block without the weight of one cell.
-pub fn without(block: &Block, cell: usize) -> Block {
-    let mut rest = block.clone();
-    for line in &mut rest.lines {
-        for (weight, row) in line.weight.iter_mut().zip(&rest.rows) {
-            if row.cell == cell {
-                *weight = 0.0;
-            }
-        }
-    }
-    rest
 }
 
 /// The best-fitting motion of each line, by block.

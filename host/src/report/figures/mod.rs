@@ -80,7 +80,7 @@ pub const ALL: &[Entry] = &[
     entry(
         Chapter::SideBySide,
         "Cells predicted from the others",
-        "an identified k_T, with four points on specimen A",
+        "a fit of the contact with points on specimen A",
         held_out::held_out,
     ),
     entry(Chapter::Measured, "Where hammer and vibrometer went", CAMPAIGN, cells::of_results),
