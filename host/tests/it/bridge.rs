@@ -182,6 +182,24 @@ fn attend(session: &mut Session, seconds: f64) {
     }
 }
 
+/// The same until the hammer is disarmed, however slow the machine is.
+fn attend_until_disarmed(session: &mut Session) {
+    let until = Instant::now() + Duration::from_secs(60);
+    while session.status().unwrap().hammer != Hammer::Disarmed {
+        assert!(Instant::now() < until, "the hammer is not disarmed");
+        session.pump(Duration::from_millis(20)).unwrap();
+    }
+}
+
+/// Arms the hammer as soon as its coil has rested.
+fn arm_rested(session: &mut Session) {
+    let until = Instant::now() + Duration::from_secs(60);
+    while let Err(refused) = session.arm(60_000) {
+        assert!(Instant::now() < until, "{refused}");
+        attend(session, 0.05);
+    }
+}
+
 /// Their words, without those that only say that the host is there.
 fn orders(lines: &[(f64, String)]) -> Vec<&str> {
     lines.iter().map(|(_, line)| line.as_str()).filter(|line| !line.contains("alive")).collect()
@@ -200,19 +218,17 @@ fn a_hammer_behind_a_bridge_is_fired_only_when_armed_within_its_bounds() {
         assert!(said.contains(word), "{said}");
     };
     refused(session.fire(pulse(1, 3500)), "not armed");
-    session.arm(5000).unwrap();
+    session.arm(60_000).unwrap();
     refused(session.fire(pulse(1, 5001)), "5000");
     session.fire(pulse(1, 5000)).unwrap();
     // no force follows: the bolt counts as missed after 0.1 s, and the host may order the next one
-    attend(&mut session, 0.4);
+    attend_until_disarmed(&mut session);
     refused(session.fire(pulse(2, 3500)), "not armed");
+    arm_rested(&mut session);
     // the device holds the order until the coil has rested
-    while session.arm(5000).is_err() {
-        attend(&mut session, 0.05);
-    }
     session.fire(pulse(2, 3500)).unwrap();
-    attend(&mut session, 2.2);
-    session.arm(5000).unwrap();
+    attend_until_disarmed(&mut session);
+    arm_rested(&mut session);
     session.disarm().unwrap();
     session.finish().unwrap();
     drop(session);
@@ -220,9 +236,10 @@ fn a_hammer_behind_a_bridge_is_fired_only_when_armed_within_its_bounds() {
     let first = r#"{"fire_us": 5000, "sequence": 1}"#;
     let second = r#"{"fire_us": 3500, "sequence": 2}"#;
     let told = orders(&lines);
-    // the last arming may be over before the program was told of it
     assert_eq!(told[..6], [ARMED, first, DISARMED, ARMED, second, DISARMED], "{told:?}");
-    assert!(told[6..].is_empty() || told[6..] == [ARMED, DISARMED], "{told:?}");
+    // The last arming may be over before the program is told of it, and the connection may end
+    // before its end is read: without a connection nothing is armed either.
+    assert!(matches!(told[6..], [] | [ARMED] | [ARMED, DISARMED]), "{told:?}");
     let time = |wanted: &str| lines.iter().find(|(_, line)| line == wanted).unwrap().0;
     assert!(time(second) - time(first) > 1.5, "{lines:?}");
     // while the second order waited for the pause
