@@ -2,9 +2,11 @@
 //! simultaneously.
 
 use jointrig::campaign::plan::CONTACT_BY_HAND;
+use jointrig::contact::ContactPriors;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::{Beam, Bushing, ContactLaw, Errors};
 use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Parameters of the draw.
@@ -187,6 +189,19 @@ pub fn elastic(number: u64, mut rig: RigConfig, which: Elastic) -> RigConfig {
         }
     }
     rig
+}
+
+/// Moves the contact's centre across the sliding direction and in height, as far as the analysis
+/// takes for usual where the plan states nothing. The draw has its own random stream.
+pub fn off_centre(number: u64, rig: &mut RigConfig) {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(0x00ce_074e_0000 + number);
+    let usual = ContactPriors::default();
+    let mut off = |sigma_m: f64| {
+        let normal: f64 = StandardNormal.sample(&mut random);
+        sigma_m * normal
+    };
+    let by_m = [off(usual.contact_across_m), off(usual.contact_height_m), 0.0];
+    rig.errors.offset_m.insert("contact".into(), by_m);
 }
 
 /// The same rig with the sensors and the person of `accelerometers.toml`.

@@ -8,7 +8,7 @@ use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::Patch;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, QUALITY_COLUMNS, Quality, print_table};
 use jointrig_tests::drawn_campaigns::{count, each, results};
-use jointrig_tests::rigs::{Drawn, Elastic, contact_plan, drawn};
+use jointrig_tests::rigs::{Drawn, Elastic, contact_plan, drawn, off_centre};
 
 /// What bends on the rig of this number: half are rigid, a quarter have specimens that bend, and on
 /// a quarter arms bend too.
@@ -16,8 +16,11 @@ fn bends(number: u64) -> Option<Elastic> {
     [None, Some(Elastic::Specimens), None, Some(Elastic::SpecimensAndArms)][(number % 4) as usize]
 }
 
+/// A rig whose plan is right, with all errors as large as stated, that of the contact's centre too.
 fn sound(number: u64) -> RigConfig {
-    drawn(number, Drawn { elastic: bends(number), ..Drawn::default() })
+    let mut rig = drawn(number, Drawn { elastic: bends(number), ..Drawn::default() });
+    off_centre(number, &mut rig);
+    rig
 }
 
 /// Runs `contact.toml` with the priors of `stated` on `rig`.
