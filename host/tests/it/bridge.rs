@@ -184,7 +184,7 @@ fn attend(session: &mut Session, seconds: f64) {
 
 /// The same until the hammer is disarmed, however slow the machine is.
 fn attend_until_disarmed(session: &mut Session) {
-    let until = Instant::now() + Duration::from_secs(60);
+    let until = Instant::now() + Duration::from_mins(1);
     while session.status().unwrap().hammer != Hammer::Disarmed {
         assert!(Instant::now() < until, "the hammer is not disarmed");
         session.pump(Duration::from_millis(20)).unwrap();
@@ -193,7 +193,7 @@ fn attend_until_disarmed(session: &mut Session) {
 
 /// Arms the hammer as soon as its coil has rested.
 fn arm_rested(session: &mut Session) {
-    let until = Instant::now() + Duration::from_secs(60);
+    let until = Instant::now() + Duration::from_mins(1);
     while let Err(refused) = session.arm(60_000) {
         assert!(Instant::now() < until, "{refused}");
         attend(session, 0.05);
