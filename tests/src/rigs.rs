@@ -6,7 +6,7 @@ use jointrig::contact::ContactPriors;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::{Beam, Bushing, ContactLaw, Errors};
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Parameters of the draw.
@@ -191,16 +191,13 @@ pub fn elastic(number: u64, mut rig: RigConfig, which: Elastic) -> RigConfig {
     rig
 }
 
-/// Moves the contact's centre across the sliding direction and in height, as far as the analysis
-/// takes for usual where the plan states nothing. The draw has its own random stream.
+/// Moves the contact's centre across the sliding direction and in height, with the standard
+/// deviations of the analysis where the plan states none. The draw has its own random stream.
 pub fn off_centre(number: u64, rig: &mut RigConfig) {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0x00ce_074e_0000 + number);
-    let usual = ContactPriors::default();
-    let mut off = |sigma_m: f64| {
-        let normal: f64 = StandardNormal.sample(&mut random);
-        sigma_m * normal
-    };
-    let by_m = [off(usual.contact_across_m), off(usual.contact_height_m), 0.0];
+    let ContactPriors { contact_across_m, contact_height_m, .. } = ContactPriors::default();
+    let [x, y]: [f64; 2] = std::array::from_fn(|_| random.sample(StandardNormal));
+    let by_m = [contact_across_m * x, contact_height_m * y, 0.0];
     rig.errors.offset_m.insert("contact".into(), by_m);
 }
 

@@ -133,9 +133,10 @@ pub fn solve(
     Ok((blocks, Solution { p: here.p, certainty, bins: here.bins, shared, chi_square }))
 }
 
-/// Of the minima that are reached, each with its cost, the one that adds most to the variance of the
-/// compliance at the best minimum `p`: the probability that the truth is there and not at `p`, which
-/// follows from the costs, and the difference of the parameters. `None` if all searches end at `p`.
+/// Of the minima that are reached, each with its cost, the one that adds most to the variance of
+/// the compliance at the best minimum `p`: the probability that the truth is there and not at `p`,
+/// which follows from the costs, and the difference of the parameters. `None` if all searches end
+/// at `p`.
 fn other_minimum(cost: f64, p: &[f64], reached: &[(f64, Vec<f64>)]) -> Option<(f64, DVector<f64>)> {
     let of = |(other, there): &(f64, Vec<f64>)| {
         let way = DVector::from_iterator(p.len(), there.iter().zip(p).map(|(there, here)| there - here));

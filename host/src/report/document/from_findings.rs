@@ -171,7 +171,7 @@ fn of_stiffness(own: &Stiffness, joint: Option<&contact::Joint>, slips: bool) ->
     }
 }
 
-/// With the digits of a curve.
+/// Rounded to the digits of a curve.
 fn shortened(one: &HeldOut) -> HeldOut {
     let short = |all: &[f64]| all.iter().map(|value| rounded(*value, DIGITS)).collect();
     HeldOut {
