@@ -13,7 +13,9 @@ use jointrig_tests::drawn_campaigns::{count, each};
 use jointrig_tests::rigs::{Drawn, contact_plan, drawn};
 use serde_json::Value;
 use std::path::Path;
-use std::time::Instant;
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 fn outlook_of(file: &Path) -> Outlook {
     let store = Store::open_read_only(file).unwrap();
@@ -176,13 +178,18 @@ fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         serde_json::from_slice(&out.stdout).unwrap()
     };
+    let run_until = |until: &str| {
+        let mut command = jointrig();
+        command.args(["campaign", "run", "--device", "sim:", "--until", until]).arg(&file);
+        command
+    };
     let goes_on = |until: &str| {
-        let out = jointrig()
-            .args(["campaign", "run", "--device", "sim:", "--until", until])
-            .arg(&file)
-            .output()
-            .unwrap();
+        let out = run_until(until).output().unwrap();
         (out.status.code(), String::from_utf8(out.stderr).unwrap())
+    };
+    let verify = || {
+        let out = jointrig().args(["campaign", "verify"]).arg(&file).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     };
     let hits = || rows(&Store::open_read_only(&file).unwrap()).len();
     let before = next("99%");
@@ -203,8 +210,23 @@ fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
     let predicted = next(&percentage);
     assert_eq!(predicted["until"]["reachable"], true, "{predicted}");
     assert!(predicted["until"]["hits"].as_u64().unwrap() > 0);
+
+    // killed after its first further hit it loses nothing, and the same command goes on
+    let silent = || Stdio::null();
+    let mut child = run_until(&percentage).stdout(silent()).stderr(silent()).spawn().unwrap();
+    while hits() == struck {
+        assert!(child.try_wait().unwrap().is_none(), "it ended without a hit");
+        sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    assert!(!child.wait().unwrap().success(), "it ended before it was killed");
+    verify();
+    let kept = hits();
+    assert!(kept > struck);
+
     let (code, said) = goes_on(&percentage);
     assert!(code == Some(0) && said.contains("was wanted"), "{code:?} {said}");
+    assert!(hits() > kept, "{kept}");
     let reached = next(&percentage);
     assert!(reached["half_width"].as_f64().unwrap() <= until && reached["until"]["reached"] == true);
     let after = hits();
@@ -212,6 +234,5 @@ fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
 
     // the same command measures nothing more, and the file is intact
     assert_eq!((goes_on(&percentage).0, hits()), (Some(0), after));
-    let out = jointrig().args(["campaign", "verify"]).arg(&file).output().unwrap();
-    assert!(out.status.success());
+    verify();
 }
