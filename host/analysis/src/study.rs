@@ -1,10 +1,13 @@
 //! Studies of several campaigns: how a quantity depends on a covariate, and how much it varies
 //! between reassemblies and within one.
 //!
-//! Model: y_i = level + slope (x_i − x̄) + b_g(i) + w_i + m_i. m_i is the campaign's own error, whose
-//! variance is known, w_i the variation within a reassembly and b_g that between reassemblies, all
-//! normally distributed and independent. An error that all campaigns share (the
-//! same spots, the same calibration) moves the level only.
+//! Model: y_i = level + f(x_i) + b_g(i) + w_i + m_i. f is a line or a smooth curve, zero at x̄. m_i is
+//! the campaign's own error, whose variance is known, w_i the variation within a reassembly and b_g
+//! that between reassemblies, all normally distributed and independent. An error that all campaigns
+//! share (the same spots, the same calibration) moves the level only.
+//!
+//! The curve is a natural cubic spline with four knots, evenly over the ranks of the covariate's
+//! values: a line, and two functions that bend (Hastie, Tibshirani, Friedman 2009, section 5.2.1).
 //!
 //! The two unknown variances are estimated by REML. Intervals come from generalised pivotal
 //! quantities (Hannig, Iyer, Patterson 2006), which hold for few groups too: the weighted sum of
@@ -14,6 +17,7 @@
 
 use crate::contact::Interval;
 use crate::student::{NORMAL_95, student_95};
+use nalgebra::{SMatrix, SVector};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
@@ -27,6 +31,28 @@ const SEED: u64 = 1;
 
 /// Largest number of reassemblies that is proposed.
 const MOST_GROUPS: usize = 1000;
+
+/// Knots of the curve, and coefficients of the model: level, slope, and two of functions that bend.
+const KNOTS: usize = 4;
+
+/// Fewest different values of the covariate for a curve: two more than it has coefficients.
+const LEAST_FOR_CURVE: usize = KNOTS + 2;
+
+/// The coefficients of level, slope and curve; those that a model lacks are zero.
+type Coefficients = SVector<f64, KNOTS>;
+
+/// A matrix of as many rows and columns.
+type Square = SMatrix<f64, KNOTS, KNOTS>;
+
+/// How the quantity may depend on the covariate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Dependence {
+    /// A straight line.
+    #[default]
+    Line,
+    /// A smooth curve.
+    Curve,
+}
 
 /// One campaign of a study.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +80,14 @@ pub enum StudyError {
         /// Fewest that are needed.
         least: usize,
     },
+    /// Too few different values of the covariate for a curve.
+    #[error(
+        "a curve needs {LEAST_FOR_CURVE} different values of the covariate (with one value in each reassembly, as many reassemblies), and there are {values}; fit a line, or add campaigns"
+    )]
+    TooFewForCurve {
+        /// Number of values.
+        values: usize,
+    },
     /// A value, a covariate or a variance is NaN or infinite, or a variance is negative.
     #[error(
         "campaign {campaign} (counted from 0): value, covariate and variance must be finite, and the variance not negative"
@@ -71,9 +105,11 @@ pub struct Trend {
     pub level: Interval,
     /// Mean of the covariate.
     pub at: f64,
-    /// Change of the value per unit of the covariate; none if all covariates are equal, or if
-    /// too few campaigns differ in it.
+    /// Change of the value per unit of the covariate; none if all covariates are equal, if too few
+    /// campaigns differ in it, or for a curve.
     pub slope: Option<Interval>,
+    /// Whether a curve bends, or else could be a line; none for a line.
+    pub bends: Option<bool>,
     /// Standard deviation between reassemblies; none if there is only one.
     pub between: Option<Interval>,
     /// Standard deviation between campaigns of one reassembly, beyond their own errors; none if no
@@ -83,23 +119,60 @@ pub struct Trend {
     pub campaigns: usize,
     /// Number of reassemblies.
     pub groups: usize,
-    /// Level and slope of each draw, for [`Trend::line`].
-    drawn: Vec<[f64; 2]>,
+    /// The columns of the model.
+    model: Model,
+    /// The estimated coefficients.
+    estimate: Coefficients,
+    /// The coefficients of each draw.
+    drawn: Vec<Coefficients>,
     /// Standard deviation of the shared error.
     shared_std: f64,
     /// Mean of the campaigns' own variances.
     own_variance: f64,
 }
 
+/// The functions of the covariate that the model adds up: constant, line, and the bending ones.
+#[derive(Debug, Clone, PartialEq)]
+struct Model {
+    /// Mean of the covariate, at which all but the constant are zero.
+    at: f64,
+    /// Number of functions: 1, 2 or [`KNOTS`].
+    columns: usize,
+    /// The curve's knots; empty without a curve.
+    knots: Vec<f64>,
+}
+
+impl Model {
+    /// The functions' values; zero for those that the model lacks.
+    fn row(&self, covariate: f64) -> Coefficients {
+        let mut row = Coefficients::zeros();
+        row[0] = 1.0;
+        if self.columns > 1 {
+            row[1] = covariate - self.at;
+        }
+        if let [first, .., before_last, last] = self.knots[..] {
+            // cubic between the knots, straight beyond them; the knots' distance as the unit
+            let scaled = |x: f64| (x - first) / (last - first);
+            let above = |x: f64, knot: f64| (scaled(x) - scaled(knot)).max(0.0).powi(3);
+            let d = |x: f64, knot: f64| (above(x, knot) - above(x, last)) / (1.0 - scaled(knot));
+            for (place, knot) in self.knots[..KNOTS - 2].iter().enumerate() {
+                let bent = |x: f64| d(x, *knot) - d(x, before_last);
+                row[2 + place] = bent(covariate) - bent(self.at);
+            }
+        }
+        row
+    }
+}
+
 /// Observations sorted by group, with the groups' ranges.
 struct Grouped {
     all: Vec<Observation>,
+    /// The model's functions at each observation.
+    rows: Vec<Coefficients>,
     ends: Vec<usize>,
-    at: f64,
-    /// Whether the covariate varies at all.
-    slope: bool,
-    /// Whether it varies within a group.
-    slope_within: bool,
+    model: Model,
+    /// The functions that vary within groups, as linearly independent ones.
+    vary_within: Vec<usize>,
 }
 
 /// The variances between groups and within.
@@ -111,10 +184,9 @@ struct Variances {
 
 /// Generalised least squares for given variances.
 struct Solved {
-    /// Level and slope.
-    estimate: [f64; 2],
-    /// Entries (0, 0), (0, 1) and (1, 1) of R, where R Rᵀ is their covariance.
-    root: [f64; 3],
+    estimate: Coefficients,
+    /// R, where R Rᵀ is their covariance.
+    root: Square,
     /// yᵀ P y: the weighted sum of squares of the residuals.
     squares: f64,
     /// ln |V| + ln |Xᵀ V⁻¹ X|.
@@ -122,111 +194,118 @@ struct Solved {
 }
 
 impl Grouped {
-    fn new(observations: &[Observation]) -> Self {
+    fn new(observations: &[Observation], dependence: Dependence) -> Result<Self, StudyError> {
         let mut all = observations.to_vec();
         all.sort_by_key(|one| one.group);
         let n = all.len();
-        let ends = (1..=n).filter(|i| *i == n || all[*i].group != all[i - 1].group).collect();
+        let ends: Vec<usize> = (1..=n).filter(|i| *i == n || all[*i].group != all[i - 1].group).collect();
         let at = all.iter().map(|one| one.covariate).sum::<f64>() / n as f64;
         let size = all.iter().map(|one| one.covariate.abs()).fold(0.0, f64::max);
         // rounding of the mean
         let differ = |a: f64, b: f64| (a - b).abs() > 1e-12 * size;
-        let slope = all.iter().any(|one| differ(one.covariate, at));
-        let mut found = Self { all, ends, at, slope, slope_within: false };
-        let inside =
-            |group: &[Observation]| group.iter().any(|one| differ(one.covariate, group[0].covariate));
-        let slope_within = found.groups().any(inside);
+        let starts = || std::iter::once(0).chain(ends.iter().copied());
+        let inside = starts().zip(&ends).any(|(start, end)| {
+            all[start..*end].iter().any(|one| differ(one.covariate, all[start].covariate))
+        });
+        let mut values: Vec<f64> = all.iter().map(|one| one.covariate).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup_by(|a, b| !differ(*a, *b));
         // with two campaigns, or two groups without a difference inside, a line fits exactly
-        let levels = if slope_within { n } else { found.ends.len() };
-        found.slope &= levels > 2;
-        found.slope_within = slope_within && found.slope;
-        found
+        let levels = if inside { n } else { ends.len() };
+        let mut model = Model { at, columns: 1, knots: Vec::new() };
+        if dependence == Dependence::Curve {
+            let values_known = values.len().min(levels);
+            if values_known < LEAST_FOR_CURVE {
+                return Err(StudyError::TooFewForCurve { values: values_known });
+            }
+            model.columns = KNOTS;
+            model.knots = (0..KNOTS).map(|knot| values[knot * (values.len() - 1) / (KNOTS - 1)]).collect();
+        } else if values.len() > 1 && levels > 2 {
+            model.columns = 2;
+        }
+        let rows = all.iter().map(|one| model.row(one.covariate)).collect();
+        let mut found = Self { all, rows, ends, model, vary_within: Vec::new() };
+        found.vary_within = found.varying_within();
+        Ok(found)
     }
 
-    fn groups(&self) -> impl Iterator<Item = &[Observation]> {
+    /// Each group's observations with their rows.
+    fn groups(&self) -> impl Iterator<Item = impl Iterator<Item = (&Observation, &Coefficients)> + Clone> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, end)| &self.all[start..*end])
+        starts.zip(&self.ends).map(|(start, end)| self.all[start..*end].iter().zip(&self.rows[start..*end]))
+    }
+
+    /// The functions that differ within groups and are no sums of others that do, by
+    /// orthogonalising their deviations from the groups' means.
+    fn varying_within(&self) -> Vec<usize> {
+        let mut orthogonal: Vec<Vec<f64>> = Vec::new();
+        let mut found = Vec::new();
+        for place in 1..self.model.columns {
+            let mut column = Vec::new();
+            for group in self.groups() {
+                let count = group.clone().count() as f64;
+                let mean = group.clone().map(|(_, row)| row[place]).sum::<f64>() / count;
+                column.extend(group.map(|(_, row)| row[place] - mean));
+            }
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let whole = self.rows.iter().map(|row| row[place] * row[place]).sum::<f64>();
+            for other in &orthogonal {
+                let part = dot(&column, other) / dot(other, other);
+                column.iter_mut().zip(other).for_each(|(value, other)| *value -= part * other);
+            }
+            // far above rounding, far below what a study of a few campaigns could see
+            if dot(&column, &column) > 1e-12 * whole {
+                orthogonal.push(column);
+                found.push(place);
+            }
+        }
+        found
     }
 
     /// Degrees of freedom within the groups, and of the remainder.
     fn freedoms(&self) -> [usize; 2] {
         let (n, groups) = (self.all.len(), self.ends.len());
-        let within = (n - groups).saturating_sub(usize::from(self.slope_within));
-        let of_model = 1 + usize::from(self.slope);
-        [within, n - of_model - within]
+        let within = (n - groups).saturating_sub(self.vary_within.len());
+        [within, (n - within).saturating_sub(self.model.columns)]
     }
 
-    /// The weighted sum of squares within the groups, at this variance within.
-    fn squares_within(&self, within: f64) -> f64 {
-        let (mut yy, mut xy, mut xx) = (0.0, 0.0, 0.0);
+    /// Sums over the groups for given variances: information, right side, weighted sum of squares
+    /// of the values, and the logarithm of |V|. Without `of_means`, those of the deviations from
+    /// the groups' weighted means only.
+    fn sums(&self, variances: Variances, of_means: bool) -> Sums {
+        let (mut sums, columns) = (Sums::default(), self.model.columns);
         for group in self.groups() {
-            let weight = |one: &Observation| (one.variance + within).recip();
-            let total: f64 = group.iter().map(weight).sum();
-            let mean = |of: &dyn Fn(&Observation) -> f64| {
-                group.iter().map(|one| weight(one) * of(one)).sum::<f64>() / total
-            };
-            let (y, x) = (mean(&|one| one.value), mean(&|one| one.covariate));
-            for one in group {
-                let (w, y, x) = (weight(one), one.value - y, one.covariate - x);
-                yy += w * y * y;
-                xy += w * x * y;
-                xx += w * x * x;
-            }
-        }
-        if self.slope_within && xx > 0.0 { (yy - xy * xy / xx).max(0.0) } else { yy }
-    }
-
-    fn solve(&self, variances: Variances) -> Solved {
-        let (mut information, mut right, mut yy, mut log) = ([0.0; 3], [0.0; 2], 0.0, 0.0);
-        for group in self.groups() {
-            let [mut w1, mut x, mut y] = [0.0; 3];
-            for one in group {
-                let w = (one.variance + variances.within).recip();
+            let weight = |one: &Observation| (one.variance + variances.within).recip();
+            let (mut w1, mut x, mut y) = (0.0, Coefficients::zeros(), 0.0);
+            for (one, row) in group.clone() {
+                let w = weight(one);
                 w1 += w;
-                x += w * (one.covariate - self.at);
+                x += w * row;
                 y += w * one.value;
-                log -= w.ln();
+                sums.log -= w.ln();
             }
             (x, y) = (x / w1, y / w1);
             // V⁻¹ of a diagonal matrix plus a constant (Sherman and Morrison), as deviations from
             // the weighted mean and the mean itself: without cancellation for any weights
-            let of_mean = w1 / (1.0 + variances.between * w1);
-            log += (variances.between * w1).ln_1p();
-            information[0] += of_mean;
-            information[1] += of_mean * x;
-            information[2] += of_mean * x * x;
-            right[0] += of_mean * y;
-            right[1] += of_mean * x * y;
-            yy += of_mean * y * y;
-            for one in group {
-                let w = (one.variance + variances.within).recip();
-                let (x, y) = (one.covariate - self.at - x, one.value - y);
-                information[2] += w * x * x;
-                right[1] += w * x * y;
-                yy += w * y * y;
+            for (one, row) in group {
+                sums.add(columns, weight(one), row - x, one.value - y);
+            }
+            if of_means {
+                sums.add(columns, w1 / (1.0 + variances.between * w1), x, y);
+                sums.log += (variances.between * w1).ln_1p();
             }
         }
-        // Cholesky factor of the information
-        let l0 = information[0].sqrt();
-        let estimate;
-        let root;
-        if self.slope {
-            let l1 = information[1] / l0;
-            let l2 = (information[2] - l1 * l1).max(0.0).sqrt();
-            let (a, b) = (right[0] / l0, (right[1] - right[0] / l0 * l1) / l2);
-            let slope = b / l2;
-            estimate = [(a - l1 * slope) / l0, slope];
-            // L⁻ᵀ, for the information L Lᵀ
-            root = [l0.recip(), -l1 / (l0 * l2), l2.recip()];
-            yy -= a * a + b * b;
-            log += 2.0 * (l0.ln() + l2.ln());
-        } else {
-            estimate = [right[0] / information[0], 0.0];
-            root = [l0.recip(), 0.0, 0.0];
-            yy -= right[0] * right[0] / information[0];
-            log += 2.0 * l0.ln();
-        }
-        Solved { estimate, root, squares: yy.max(0.0), log_determinants: log }
+        sums
+    }
+
+    /// The weighted sum of squares within the groups, at this variance within.
+    fn squares_within(&self, within: f64) -> f64 {
+        let sums = self.sums(Variances { between: 0.0, within }, false);
+        sums.solve(|place| self.vary_within.contains(&place)).squares
+    }
+
+    fn solve(&self, variances: Variances) -> Solved {
+        self.sums(variances, true).solve(|place| place < self.model.columns)
     }
 
     /// −2 ln of the restricted likelihood, but for a constant.
@@ -262,6 +341,59 @@ impl Grouped {
         }
         let [between, within] = best.0;
         Variances { between: between * between, within: within * within }
+    }
+}
+
+/// See [`Grouped::sums`].
+#[derive(Default)]
+struct Sums {
+    information: Square,
+    right: Coefficients,
+    squares: f64,
+    log: f64,
+}
+
+impl Sums {
+    /// Adds an observation; only the lower triangle of the information is filled.
+    fn add(&mut self, columns: usize, weight: f64, row: Coefficients, value: f64) {
+        for i in 0..columns {
+            let weighted = weight * row[i];
+            for j in 0..=i {
+                self.information[(i, j)] += weighted * row[j];
+            }
+            self.right[i] += weighted * value;
+        }
+        self.squares += weight * value * value;
+    }
+
+    /// Generalised least squares for the coefficients that `free` selects; the others are zero.
+    fn solve(self, free: impl Fn(usize) -> bool) -> Solved {
+        let (mut information, mut right) = (self.information, self.right);
+        for place in (0..KNOTS).filter(|place| !free(*place)) {
+            information.fill_row(place, 0.0);
+            information.fill_column(place, 0.0);
+            // an own equation, so that the factor exists; it adds nothing to the determinant
+            information[(place, place)] = 1.0;
+            right[place] = 0.0;
+        }
+        // L Lᵀ = information; the columns have different units
+        let scale = information.diagonal().map(|d| if d > 0.0 { d.sqrt() } else { 1.0 });
+        let unit = Square::from_fn(|i, j| information[(i, j)] / (scale[i] * scale[j]));
+        // dependent columns are left out before, so that only rounding can stop the factor
+        let factor = nalgebra::Cholesky::new(unit)
+            .or_else(|| nalgebra::Cholesky::new(unit + 1e-12 * Square::identity()))
+            .map_or_else(Square::identity, |factor| factor.l());
+        let lower = Square::from_fn(|i, j| scale[i] * factor[(i, j)]);
+        let explained = lower.solve_lower_triangular(&right).unwrap_or_default();
+        let upper = lower.transpose();
+        let estimate = upper.solve_upper_triangular(&explained).unwrap_or_default();
+        let root = upper.solve_upper_triangular(&Square::identity()).unwrap_or_default();
+        Solved {
+            estimate,
+            root,
+            squares: (self.squares - explained.norm_squared()).max(0.0),
+            log_determinants: self.log + 2.0 * lower.diagonal().map(f64::ln).sum(),
+        }
     }
 }
 
@@ -323,16 +455,49 @@ fn central(mut values: Vec<f64>) -> [f64; 2] {
     [at(0.025), at(0.975)]
 }
 
-/// Fits level, slope and variances to these campaigns. `shared_std` is the standard deviation of an
-/// error that all of them share.
-///
-/// # Errors
-/// [`StudyError`]: too few campaigns, or a number that is none.
-pub fn trend(observations: &[Observation], shared_std: f64) -> Result<Trend, StudyError> {
-    with_draws(observations, shared_std, DRAWS)
+/// Whether the draws of some coefficients contradict that all of them are zero: the estimate's
+/// distance from zero, by the draws' covariance, is larger than that of 95 % of the draws from the
+/// estimate.
+fn contradict_zero(estimate: &Coefficients, drawn: &[Coefficients], places: std::ops::Range<usize>) -> bool {
+    let mut covariance = Square::identity();
+    let of_draws = |i: usize, j: usize| {
+        let products = drawn.iter().map(|d| (d[i] - estimate[i]) * (d[j] - estimate[j]));
+        products.sum::<f64>() / drawn.len() as f64
+    };
+    for i in places.clone() {
+        for j in places.clone() {
+            covariance[(i, j)] = of_draws(i, j);
+        }
+    }
+    let Some(inverse) = covariance.try_inverse() else { return false };
+    let distance = |of: &dyn Fn(usize) -> f64| {
+        let x = Coefficients::from_fn(|i, _| if places.contains(&i) { of(i) } else { 0.0 });
+        x.dot(&(inverse * x))
+    };
+    let limit = distance(&|i| estimate[i]);
+    let farther = drawn.iter().filter(|d| distance(&|i| d[i] - estimate[i]) >= limit).count();
+    (farther as f64) < 0.05 * drawn.len() as f64
 }
 
-fn with_draws(observations: &[Observation], shared_std: f64, draws: usize) -> Result<Trend, StudyError> {
+/// Fits level, dependence and variances to these campaigns. `shared_std` is the standard deviation
+/// of an error that all of them share.
+///
+/// # Errors
+/// [`StudyError`]: too few campaigns or values for the curve, or a number that is none.
+pub fn trend(
+    observations: &[Observation],
+    shared_std: f64,
+    dependence: Dependence,
+) -> Result<Trend, StudyError> {
+    with_draws(observations, shared_std, dependence, DRAWS)
+}
+
+fn with_draws(
+    observations: &[Observation],
+    shared_std: f64,
+    dependence: Dependence,
+    draws: usize,
+) -> Result<Trend, StudyError> {
     const LEAST: usize = 3;
     if observations.len() < LEAST {
         return Err(StudyError::TooFew { campaigns: observations.len(), least: LEAST });
@@ -343,7 +508,7 @@ fn with_draws(observations: &[Observation], shared_std: f64, draws: usize) -> Re
     if let Some(campaign) = observations.iter().position(|one| !sound(one)) {
         return Err(StudyError::NotFinite { campaign });
     }
-    let mut study = Grouped::new(observations);
+    let mut study = Grouped::new(observations, dependence)?;
     let n = study.all.len() as f64;
     let mean = study.all.iter().map(|one| one.value).sum::<f64>() / n;
     let scatter = study.all.iter().map(|one| (one.value - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -362,7 +527,9 @@ fn with_draws(observations: &[Observation], shared_std: f64, draws: usize) -> Re
             // no degrees of freedom: the variance is not drawn either
             Err(_) => vec![0.0; draws],
         });
-    let normal: [Vec<f64>; 3] = std::array::from_fn(|_| stratified(draws, &mut rng, StandardNormal));
+    let [constant, line, shared, bent @ ..]: [Vec<f64>; KNOTS + 1] =
+        std::array::from_fn(|_| stratified(draws, &mut rng, StandardNormal));
+    let normal = [[constant, line], bent].concat();
     let (mut drawn, mut between, mut within) = (Vec::new(), Vec::new(), Vec::new());
     for draw in 0..draws {
         let variance_within = if free_within == 0 {
@@ -379,9 +546,13 @@ fn with_draws(observations: &[Observation], shared_std: f64, draws: usize) -> Re
             })
         };
         let solved = study.solve(Variances { between: variance_between, within: variance_within });
-        let [z0, z1, shared] = normal.each_ref().map(|values| values[draw]);
-        let [a, b, c] = solved.root;
-        drawn.push([solved.estimate[0] + a * z0 + b * z1 + shared_std * shared, solved.estimate[1] + c * z1]);
+        let z = Coefficients::from_fn(|place, _| normal[place][draw]);
+        let mut coefficients = solved.estimate + solved.root * z;
+        coefficients[0] += shared_std * shared[draw];
+        for place in study.model.columns..KNOTS {
+            coefficients[place] = 0.0;
+        }
+        drawn.push(coefficients);
         between.push(variance_between.sqrt());
         within.push(variance_within.sqrt());
     }
@@ -394,12 +565,15 @@ fn with_draws(observations: &[Observation], shared_std: f64, draws: usize) -> Re
     };
     Ok(Trend {
         level: of(0),
-        at: study.at,
-        slope: study.slope.then(|| of(1)),
+        at: study.model.at,
+        slope: (study.model.columns == 2).then(|| of(1)),
+        bends: (study.model.columns == KNOTS).then(|| contradict_zero(&estimate, &drawn, 2..KNOTS)),
         between: scatter(best.between, between, free_between),
         within: scatter(best.within, within, free_within),
         campaigns: study.all.len(),
         groups: study.ends.len(),
+        model: study.model,
+        estimate,
         drawn,
         shared_std,
         own_variance,
@@ -407,19 +581,31 @@ fn with_draws(observations: &[Observation], shared_std: f64, draws: usize) -> Re
 }
 
 impl Trend {
-    /// The line at this covariate, with its 95 % interval.
+    /// The line or curve at this covariate, with its 95 % interval.
     pub fn line(&self, covariate: f64) -> Interval {
-        let x = covariate - self.at;
-        let slope = self.slope.map_or(0.0, |slope| slope.mean);
+        self.combined(&self.model.row(covariate))
+    }
+
+    /// How much more the line or curve is at the second covariate than at the first; none if there
+    /// is only a level.
+    pub fn change(&self, from: f64, to: f64) -> Option<Interval> {
+        (self.model.columns > 1).then(|| self.combined(&(self.model.row(to) - self.model.row(from))))
+    }
+
+    fn combined(&self, row: &Coefficients) -> Interval {
         Interval {
-            mean: self.level.mean + slope * x,
-            ci95: central(self.drawn.iter().map(|[level, slope]| level + slope * x).collect()),
+            mean: row.dot(&self.estimate),
+            ci95: central(self.drawn.iter().map(|coefficients| row.dot(coefficients)).collect()),
         }
     }
 
-    /// Whether the value depends on the covariate: whether zero is outside the slope's interval.
+    /// Whether the value depends on the covariate: whether zero is outside the slope's interval, or
+    /// outside the joint region of a curve's coefficients.
     pub fn found(&self) -> Option<bool> {
-        self.slope.map(|slope| slope.ci95[0] > 0.0 || slope.ci95[1] < 0.0)
+        match self.slope {
+            Some(slope) => Some(slope.ci95[0] > 0.0 || slope.ci95[1] < 0.0),
+            None => self.bends.map(|_| contradict_zero(&self.estimate, &self.drawn, 1..KNOTS)),
+        }
     }
 
     /// Fewest reassemblies, of `each` campaigns, after which the level's 95 % interval is expected
@@ -521,7 +707,8 @@ mod tests {
     fn covered(kind: &Drawn, seeds: std::ops::Range<u64>) -> [usize; 4] {
         let mut covered = [0; 4];
         for seed in seeds {
-            let found = with_draws(&kind.observations(seed), kind.shared, FEWER).expect("enough campaigns");
+            let found = with_draws(&kind.observations(seed), kind.shared, Dependence::Line, FEWER)
+                .expect("enough campaigns");
             let intervals = [
                 (found.level, 5.0),
                 (found.slope.expect("covariates differ"), kind.slope),
@@ -568,7 +755,9 @@ mod tests {
         };
         let found = |slope: f64| {
             let of = |seed| {
-                with_draws(&kind(slope).observations(seed), 0.03, FEWER).expect("enough campaigns").found()
+                with_draws(&kind(slope).observations(seed), 0.03, Dependence::Line, FEWER)
+                    .expect("enough campaigns")
+                    .found()
             };
             (0..200).filter(|seed| of(5000 + seed) == Some(true)).count()
         };
@@ -595,7 +784,7 @@ mod tests {
             for one in &mut all {
                 one.covariate = 1.0;
             }
-            let found = trend(&all, 0.0).expect("enough campaigns");
+            let found = trend(&all, 0.0, Dependence::Line).expect("enough campaigns");
             let means: Vec<f64> =
                 all.chunks(5).map(|group| group.iter().map(|one| one.value).sum::<f64>() / 5.0).collect();
             let squares = |values: &[f64]| {
@@ -630,7 +819,7 @@ mod tests {
             shared: 0.0,
         };
         let all = kind.observations(3);
-        let found = trend(&all, 0.0).expect("enough campaigns");
+        let found = trend(&all, 0.0, Dependence::Line).expect("enough campaigns");
         let xx: f64 = all.iter().map(|one| (one.covariate - 0.5).powi(2)).sum();
         let mean = all.iter().map(|one| one.value).sum::<f64>() / 15.0;
         let slope = all.iter().map(|one| (one.covariate - 0.5) * one.value).sum::<f64>() / xx;
@@ -645,6 +834,82 @@ mod tests {
         assert!(found.within.is_none(), "one campaign per reassembly says nothing about it");
     }
 
+    /// A curve that is a line in truth: its joint test of the bend is wrong in 5 % of the studies,
+    /// its band covers the line, and for a truth that bends the band covers that too.
+    #[test]
+    fn a_curve_covers_and_finds_bends_as_stated() {
+        let kind = Drawn {
+            groups: 8,
+            each: 3,
+            between: 0.01,
+            within: 0.01,
+            own: [0.005, 0.01],
+            slope: 0.05,
+            shared: 0.0,
+        };
+        let (mut alarms, mut seen, mut covered) = (0, 0, [0; 2]);
+        // the spline follows it to a few per cent of its height, far below the band
+        let hump = |x: f64| 0.1 * (std::f64::consts::PI * x).sin();
+        for seed in 0..200 {
+            let straight = kind.observations(7000 + seed);
+            let mut bent = straight.clone();
+            for one in &mut bent {
+                one.value += hump(one.covariate);
+            }
+            let [line, curve] = [straight, bent]
+                .map(|all| with_draws(&all, 0.0, Dependence::Curve, FEWER).expect("enough campaigns"));
+            alarms += usize::from(line.bends == Some(true));
+            seen += usize::from(curve.bends == Some(true));
+            let x = 0.4;
+            covered[0] += usize::from(covers(line.line(x), 5.0 + 0.05 * (x - 0.5)));
+            covered[1] += usize::from(covers(curve.line(x), 5.0 + 0.05 * (x - 0.5) + hump(x)));
+            assert_eq!(line.slope, None);
+        }
+        assert!(covered.iter().all(|count| COVERING.contains(count)), "{covered:?}");
+        // 5 % of 200, plus what chance adds in 99.9 % of such tests
+        assert!(alarms <= 20, "{alarms}");
+        assert!(seen > 180, "{seen}");
+    }
+
+    /// Without scatter, a natural spline with the same knots is followed exactly, and a line exactly
+    /// by any curve; beyond the last knot the curve is straight.
+    #[test]
+    fn a_curve_is_the_natural_spline_and_straight_beyond_its_knots() {
+        let of = |f: &dyn Fn(f64) -> f64| -> Trend {
+            let one = |i: u8| Observation {
+                value: f(f64::from(i)),
+                variance: 1e-6,
+                covariate: f64::from(i),
+                group: usize::from(i),
+            };
+            trend(&(0..10).map(one).collect::<Vec<_>>(), 0.0, Dependence::Curve).expect("enough campaigns")
+        };
+        // knots 0, 3, 6, 9; cubic pieces whose second derivative is 0 at both ends
+        let cube = |x: f64| x.max(0.0).powi(3);
+        let spline = |x: f64| 1.0 + cube(x) - 3.0 * cube(x - 3.0) + 3.0 * cube(x - 6.0) - cube(x - 9.0);
+        let found = of(&spline);
+        for x in [-2.0, 0.5, 4.2, 8.9, 12.0] {
+            let (own, truth) = (found.line(x).mean, spline(x));
+            assert!((own - truth).abs() < 1e-6 * truth.abs().max(1.0), "{x}: {own} {truth}");
+        }
+        let line = of(&|x| 2.0 - 0.3 * x);
+        assert!((line.line(20.0).mean + 4.0).abs() < 1e-6 && line.bends == Some(false));
+        let change = line.change(0.0, 9.0).expect("a curve").mean;
+        assert!((change + 2.7).abs() < 1e-6, "{change}");
+    }
+
+    #[test]
+    fn a_curve_needs_six_values() {
+        let one = |x: u8, group| Observation { value: 1.0, variance: 1.0, covariate: f64::from(x), group };
+        let few: Vec<_> = (0..12).map(|i| one(i % 5, usize::from(i))).collect();
+        assert_eq!(trend(&few, 0.0, Dependence::Curve), Err(StudyError::TooFewForCurve { values: 5 }));
+        // with one value in each reassembly, it is the reassemblies that count
+        let grouped: Vec<_> = (0..15).map(|i| one(i / 3, usize::from(i / 3))).collect();
+        assert_eq!(trend(&grouped, 0.0, Dependence::Curve), Err(StudyError::TooFewForCurve { values: 5 }));
+        let enough: Vec<_> = (0..12).map(|i| one(i % 6, usize::from(i))).collect();
+        assert!(trend(&enough, 0.0, Dependence::Curve).is_ok());
+    }
+
     #[test]
     fn what_all_share_widens_the_level_only_and_no_number_of_reassemblies_removes_it() {
         let kind = Drawn {
@@ -657,7 +922,8 @@ mod tests {
             shared: 0.0,
         };
         let all = kind.observations(8);
-        let [alone, sharing] = [0.0, 0.05].map(|std| trend(&all, std).expect("enough campaigns"));
+        let [alone, sharing] =
+            [0.0, 0.05].map(|std| trend(&all, std, Dependence::Line).expect("enough campaigns"));
         let width = |of: Interval| of.ci95[1] - of.ci95[0];
         assert_eq!(alone.slope.expect("differ").ci95, sharing.slope.expect("differ").ci95);
         assert!(width(sharing.level) > 1.9 * 1.96 * 0.05 && width(sharing.level) > 3.0 * width(alone.level));
@@ -678,14 +944,17 @@ mod tests {
     fn equal_values_have_no_scatter_and_few_or_broken_ones_are_refused() {
         let one = |value, covariate, group| Observation { value, variance: 0.0, covariate, group };
         let same: Vec<_> = (0..6).map(|i| one(2.0, f64::from(i), i as usize / 2)).collect();
-        let found = trend(&same, 0.0).expect("enough campaigns");
+        let found = trend(&same, 0.0, Dependence::Line).expect("enough campaigns");
         assert!((found.level.mean - 2.0).abs() < 1e-9 && found.slope.expect("differ").mean.abs() < 1e-9);
         assert!(found.between.expect("three groups").mean < 1e-6);
-        assert_eq!(trend(&same[..2], 0.0), Err(StudyError::TooFew { campaigns: 2, least: 3 }));
+        assert_eq!(
+            trend(&same[..2], 0.0, Dependence::Line),
+            Err(StudyError::TooFew { campaigns: 2, least: 3 })
+        );
         let mut broken = same.clone();
         broken[4].variance = -1.0;
-        assert_eq!(trend(&broken, 0.0), Err(StudyError::NotFinite { campaign: 4 }));
+        assert_eq!(trend(&broken, 0.0, Dependence::Line), Err(StudyError::NotFinite { campaign: 4 }));
         broken[4].variance = f64::NAN;
-        assert_eq!(trend(&broken, 0.0), Err(StudyError::NotFinite { campaign: 4 }));
+        assert_eq!(trend(&broken, 0.0, Dependence::Line), Err(StudyError::NotFinite { campaign: 4 }));
     }
 }

@@ -11,13 +11,15 @@ use crate::contact::Interval;
 use crate::exchange::study_table::{StudyTable, read_study};
 use crate::exchange::tables_output::write_rows;
 use crate::report;
-use crate::study::{Observation, Trend, trend};
+use crate::report::words::trend_sentences::{sentences, shown_as};
+use crate::results::{CampaignOfStudy, FittedPoint, StudiedQuantity, TrendOverCampaigns};
+use crate::structure::Structure;
+use crate::study::{Dependence, Observation, Trend, trend};
 use crate::substructuring::joint_over_bands::NORMAL_95;
 use crate::untrusted_input;
 use crate::untrusted_text::tell_line;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use jiff::Timestamp;
-use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -33,6 +35,9 @@ const OWN_CAUSES: [&str; 4] = ["noise", "aim", "drift", "misfit"];
 /// A day, s.
 const DAY_S: f64 = 86_400.0;
 
+/// Points of the fitted line or curve.
+const FITTED: usize = 101;
+
 /// Fit how a quantity of several campaigns depends on time, temperature or a column of a table, and
 /// how much it varies between reassemblies.
 ///
@@ -44,8 +49,8 @@ pub struct TrendArgs {
     #[arg(value_name = "FILES", required = true)]
     files: Vec<PathBuf>,
     /// The quantity.
-    #[arg(long, value_enum, default_value_t = Quantity::KT)]
-    of: Quantity,
+    #[arg(long, value_enum, default_value_t = StudiedQuantity::KT)]
+    of: StudiedQuantity,
     /// The covariate: `time` (days since the first campaign), `temperature` (°C), or a column of
     /// --table [default: none, the level and its scatter only].
     #[arg(long, value_name = "COVARIATE")]
@@ -60,10 +65,15 @@ pub struct TrendArgs {
     /// Fit a power law: the quantity is proportional to a power of the covariate.
     #[arg(long, requires = "against")]
     power_law: bool,
+    /// Fit a smooth curve instead of a line: a natural cubic spline with four knots. It needs six
+    /// different values of the covariate.
+    #[arg(long, requires = "against", conflicts_with = "power_law")]
+    curve: bool,
     /// How far, %, the mean may be off with 95 %: prints how many reassemblies that needs.
     #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = positive)]
     within: f64,
-    /// Folder for trend.json and trend.csv; created if it does not exist.
+    /// Folder for trend.json, trend.html, trend.svg, trend.csv and trend.parquet; created if it does
+    /// not exist.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print trend.json on stdout.
@@ -71,99 +81,27 @@ pub struct TrendArgs {
     json: bool,
 }
 
-/// A quantity of each campaign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Quantity {
-    /// The contact's stiffness k_T, N/m.
-    #[value(name = "k-t")]
-    KT,
-    /// The contact's damping c_T, N s/m.
-    #[value(name = "c-t")]
-    CT,
-    /// The stiffness between the arms, N/m.
-    #[value(name = "between-arms")]
-    BetweenArms,
-}
-
-impl Quantity {
-    fn pointer(self) -> &'static str {
-        match self {
-            Quantity::KT => "/answer/contact/k_t_n_per_m",
-            Quantity::CT => "/answer/contact/c_t_n_s_per_m",
-            Quantity::BetweenArms => "/answer/between_arms/k_n_per_m",
+/// Where a quantity is in results.json.
+fn place_of(quantity: StudiedQuantity, results: &Value) -> Option<&Value> {
+    let rows = |at: &str| results.pointer(at).and_then(Value::as_array).into_iter().flatten();
+    let found = match quantity {
+        StudiedQuantity::KT => results.pointer("/answer/contact/k_t_n_per_m"),
+        StudiedQuantity::CT => results.pointer("/answer/contact/c_t_n_s_per_m"),
+        StudiedQuantity::BetweenArms => results.pointer("/answer/between_arms/k_n_per_m"),
+        StudiedQuantity::FrictionCoefficient => {
+            let slips = |row: &&Value| row["friction_coefficient"].is_number();
+            let amplitude = |row: &&Value| row["amplitude_m"].as_f64().unwrap_or(0.0);
+            rows("/hysteresis")
+                .filter(slips)
+                .max_by(|a, b| amplitude(a).total_cmp(&amplitude(b)))
+                .map(|row| &row["friction_coefficient"])
         }
-    }
-
-    /// Its field in the files, with the unit.
-    fn field(self) -> &'static str {
-        match self {
-            Quantity::KT => "k_t_n_per_m",
-            Quantity::CT => "c_t_n_s_per_m",
-            Quantity::BetweenArms => "between_arms_n_per_m",
-        }
-    }
-
-    fn symbol(self) -> &'static str {
-        match self {
-            Quantity::KT => "k_T",
-            Quantity::CT => "c_T",
-            Quantity::BetweenArms => "k between the arms",
-        }
-    }
-
-    fn shown(self, value: f64) -> String {
-        match self {
-            Quantity::KT | Quantity::BetweenArms => format!("{:.2} N/µm", 1e-6 * value),
-            Quantity::CT => format!("{value:.1} N s/m"),
-        }
-    }
-}
-
-/// One campaign of the study.
-#[derive(Debug, Clone, Serialize)]
-struct CampaignOfStudy {
-    /// Name of the campaign file.
-    file: String,
-    /// The quantity with its interval.
-    value: Interval,
-    /// The covariate.
-    covariate: Option<f64>,
-    /// The reassembly.
-    reassembly: Option<String>,
-    /// Relative standard deviation of its own error.
-    own_std: f64,
-    /// Relative standard deviation of the error that it shares with the others.
-    shared_std: f64,
-}
-
-/// trend.json. Standard deviations and changes are relative (of the logarithm).
-#[derive(Serialize)]
-struct TrendDocument<'a> {
-    quantity: &'static str,
-    against: Option<&'a str>,
-    power_law: bool,
-    /// The level at the covariate's mean (for a power law, its geometric mean).
-    level: Interval,
-    at: Option<f64>,
-    /// Relative change per unit of the covariate; for a power law, the exponent.
-    slope: Option<Interval>,
-    /// Relative change over the range of the covariate.
-    change: Option<Interval>,
-    /// Whether the quantity depends on the covariate; null if it has none, or too few values.
-    depends: Option<bool>,
-    /// Relative standard deviation between reassemblies.
-    between: Option<Interval>,
-    /// Relative standard deviation within a reassembly.
-    within: Option<Interval>,
-    /// Relative standard deviation of the error that all campaigns share.
-    shared_std: f64,
-    /// Reassemblies of as many campaigns as here, for a mean within ± `within_percent`; null if
-    /// what all share prevents it.
-    reassemblies_needed: Option<usize>,
-    within_percent: f64,
-    campaigns: &'a [CampaignOfStudy],
-    /// Files that are left out, each with the reason.
-    left_out: &'a BTreeMap<String, String>,
+        // they are sorted by frequency
+        StudiedQuantity::FirstMode => rows("/modes")
+            .find(|row| row["structure"].as_str() == Some(Structure::Ajb.name()))
+            .map(|row| &row["frequency_hz"]),
+    };
+    found.filter(|value| !value.is_null())
 }
 
 impl TrendArgs {
@@ -210,12 +148,14 @@ impl TrendArgs {
         }
         let observations = self.observations(&campaigns)?;
         let shared = campaigns.iter().map(|one| one.shared_std).fold(0.0, f64::max);
-        let found = trend(&observations, shared).map_err(|error| CliError::Bad(format!("trend: {error}")))?;
-        let document = self.document(&found, &observations, shared, &campaigns, &left_out);
+        let dependence = if self.curve { Dependence::Curve } else { Dependence::Line };
+        let found = trend(&observations, shared, dependence)
+            .map_err(|error| CliError::Bad(format!("trend: {error}")))?;
+        let document = self.document(&found, &observations, shared, campaigns, left_out);
         if let Some(folder) = &self.out {
-            self.write(folder, &document, &found, &observations)?;
+            self.write(folder, &document)?;
         }
-        if self.json { output::json(&document) } else { output::lines(self.lines(&document)) }
+        if self.json { output::json(&document) } else { output::lines(sentences(&document)) }
     }
 
     fn campaign(
@@ -224,25 +164,36 @@ impl TrendArgs {
         results: &Value,
         table: Option<&StudyTable>,
     ) -> Result<CampaignOfStudy, String> {
-        let found = results.pointer(self.of.pointer()).filter(|value| !value.is_null());
-        let Some(found) = found else {
-            let why = results.pointer("/answer/contact/why").and_then(Value::as_str).unwrap_or("no answer");
-            return Err(format!("it has no {}: {why}", self.of.symbol()));
+        let (symbol, ..) = shown_as(self.of);
+        let Some(found) = place_of(self.of, results) else {
+            let why = match self.of {
+                StudiedQuantity::FrictionCoefficient => {
+                    "no level of the shaker slips, or the plan states no normal load"
+                }
+                StudiedQuantity::FirstMode => "no mode of the assembly was found",
+                _ => results.pointer("/answer/contact/why").and_then(Value::as_str).unwrap_or("no answer"),
+            };
+            return Err(format!("it has no {symbol}: {why}"));
         };
         let number = |at: &str| found.pointer(at).and_then(Value::as_f64);
-        let value = match [number("/mean"), number("/ci95/0"), number("/ci95/1")] {
+        // a plain number has no interval of its own: its error counts as scatter
+        let exact = found.as_f64();
+        let value = match [
+            number("/mean").or(exact),
+            number("/ci95/0").or(exact),
+            number("/ci95/1").or(exact),
+        ] {
             [Some(mean), Some(low), Some(high)] if low > 0.0 && mean > 0.0 && high.is_finite() => {
                 Interval { mean, ci95: [low, high] }
             }
             _ => {
                 return Err(format!(
-                    "the interval of its {} is not finite and above zero: a relative change cannot be computed",
-                    self.of.symbol()
+                    "the interval of its {symbol} is not finite and above zero: a relative change cannot be computed"
                 ));
             }
         };
         let std = (value.ci95[1] / value.ci95[0]).ln() / (2.0 * NORMAL_95);
-        let own = own_part(results).filter(|_| self.of == Quantity::KT).unwrap_or(1.0);
+        let own = own_part(results).filter(|_| self.of == StudiedQuantity::KT).unwrap_or(1.0);
         let row = table.map(|table| table.row(name)).transpose()?;
         let covariate = match self.against.as_deref() {
             None | Some("time") => None,
@@ -270,6 +221,9 @@ impl TrendArgs {
             reassembly,
             own_std: std * own.sqrt(),
             shared_std: std * (1.0 - own).max(0.0).sqrt(),
+            simulated: results.pointer("/source/simulated").and_then(Value::as_bool) == Some(true),
+            // known after the fit
+            trend: value,
         })
     }
 
@@ -299,144 +253,115 @@ impl TrendArgs {
         Ok(observations)
     }
 
-    fn document<'a>(
-        &'a self,
+    fn document(
+        &self,
         found: &Trend,
         observations: &[Observation],
         shared_std: f64,
-        campaigns: &'a [CampaignOfStudy],
-        left_out: &'a BTreeMap<String, String>,
-    ) -> TrendDocument<'a> {
+        mut campaigns: Vec<CampaignOfStudy>,
+        left_out: BTreeMap<String, String>,
+    ) -> TrendOverCampaigns {
         let covariates = || observations.iter().map(|one| one.covariate);
-        let range =
-            covariates().fold(f64::NEG_INFINITY, f64::max) - covariates().fold(f64::INFINITY, f64::min);
+        let first = covariates().fold(f64::INFINITY, f64::min);
+        let last = covariates().fold(f64::NEG_INFINITY, f64::max);
         let each = (found.campaigns as f64 / found.groups as f64).round() as usize;
-        TrendDocument {
-            quantity: self.of.field(),
-            against: self.against.as_deref(),
-            power_law: self.power_law,
-            level: exponential(found.level),
-            at: self.against.is_some().then(|| if self.power_law { found.at.exp() } else { found.at }),
-            slope: found.slope,
-            change: found.slope.map(|slope| {
-                let over = |slope: f64| (slope * range).exp_m1();
-                Interval { mean: over(slope.mean), ci95: slope.ci95.map(over) }
+        let stated = |x: f64| if self.power_law { x.exp() } else { x };
+        for (one, observation) in campaigns.iter_mut().zip(observations) {
+            one.trend = exponential(found.line(observation.covariate));
+        }
+        let fitted = |point: usize| {
+            let x = first + (last - first) * point as f64 / (FITTED - 1) as f64;
+            FittedPoint { covariate: stated(x), value: exponential(found.line(x)) }
+        };
+        let change = self.against.as_ref().and_then(|_| found.change(first, last));
+        TrendOverCampaigns {
+            quantity: self.of,
+            against: self.against.clone(),
+            dependence: self.against.as_ref().map(|_| match (self.power_law, self.curve) {
+                (true, _) => "power-law",
+                (_, true) => "curve",
+                _ => "line",
             }),
+            level: exponential(found.level),
+            at: self.against.is_some().then(|| stated(found.at)),
+            slope: found.slope,
+            change: change.map(|of| Interval { mean: of.mean.exp_m1(), ci95: of.ci95.map(f64::exp_m1) }),
             depends: found.found(),
+            bends: found.bends,
             between: found.between,
             within: found.within,
             shared_std,
             reassemblies_needed: found.reassemblies_for((1.0 + 0.01 * self.within).ln(), each),
-            within_percent: self.within,
+            wanted_percent: self.within,
             campaigns,
+            fitted: if change.is_some() { (0..FITTED).map(fitted).collect() } else { Vec::new() },
             left_out,
         }
     }
 
-    fn write(
-        &self,
-        folder: &Path,
-        document: &TrendDocument<'_>,
-        found: &Trend,
-        observations: &[Observation],
-    ) -> Result<(), CliError> {
+    fn write(&self, folder: &Path, document: &TrendOverCampaigns) -> Result<(), CliError> {
         let failed = |doing| move |source| CliError::File { path: folder.into(), doing, source };
         std::fs::create_dir_all(folder).map_err(failed("making the folder"))?;
         let text = serde_json::to_string_pretty(document)
             .map_err(|error| CliError::Bad(format!("trend.json could not be written: {error}")))?;
         report::write_whole(&folder.join("trend.json"), (text + "\n").as_bytes())
             .map_err(failed("writing trend.json"))?;
-        let field = self.of.field();
-        let mut rows = vec![vec![
-            "file".to_owned(),
-            "reassembly".to_owned(),
-            self.against.clone().unwrap_or_else(|| "covariate".to_owned()),
-            field.to_owned(),
-            "low".to_owned(),
-            "high".to_owned(),
-            "trend".to_owned(),
-            "trend_low".to_owned(),
-            "trend_high".to_owned(),
-        ]];
-        for (one, observation) in document.campaigns.iter().zip(observations) {
-            let line = exponential(found.line(observation.covariate));
-            let numbers = [&one.value, &line].map(|of| [of.mean, of.ci95[0], of.ci95[1]]);
-            let mut row = vec![
-                one.file.clone(),
-                one.reassembly.clone().unwrap_or_default(),
-                one.covariate.map(|x| x.to_string()).unwrap_or_default(),
-            ];
-            row.extend(numbers.as_flattened().iter().map(f64::to_string));
-            rows.push(row);
-        }
-        write_rows(&folder.join("trend.csv"), &rows).map_err(|error| CliError::Bad(error.to_string()))?;
-        tell_line!("jointrig: {}: trend.json, trend.csv", folder.display());
+        report::write_whole(&folder.join("trend.html"), report::trend_page(document).as_bytes())
+            .map_err(failed("writing trend.html"))?;
+        let figure = report::trend_figure(document);
+        report::write_figure(&figure, report::Format::Svg, &folder.join("trend.svg"))
+            .map_err(failed("writing trend.svg"))?;
+        self.tables(folder, document)?;
+        let parquet = if cfg!(feature = "parquet") { ", trend.parquet" } else { "" };
+        tell_line!("jointrig: {}: trend.html, trend.svg, trend.json, trend.csv{parquet}", folder.display());
         Ok(())
     }
 
-    fn lines(&self, document: &TrendDocument<'_>) -> Vec<String> {
-        let of = self.of;
-        let [low, high] = document.level.ci95;
-        let at = match (document.against, document.at) {
-            (Some(name), Some(at)) => format!(" at {name} {at:.4}"),
-            _ => String::new(),
+    /// trend.csv and trend.parquet, a row for each campaign.
+    fn tables(&self, folder: &Path, document: &TrendOverCampaigns) -> Result<(), CliError> {
+        let field = serde_json::to_value(self.of).ok().and_then(|name| name.as_str().map(str::to_owned));
+        let field = field.unwrap_or_default();
+        let covariate = self.against.as_deref().unwrap_or("covariate");
+        let texts = ["file", "reassembly"];
+        let numbers = [covariate, &field, "low", "high", "trend", "trend_low", "trend_high"];
+        let row = |one: &CampaignOfStudy| {
+            let [value, trend] =
+                [&one.value, &one.trend].map(|of| [of.mean, of.ci95[0], of.ci95[1]].map(Some));
+            let mut row = vec![one.covariate];
+            row.extend(value.into_iter().chain(trend));
+            row
         };
-        let mut lines = vec![format!(
-            "{}{at}: {} ({} to {}), from {} campaigns",
-            of.symbol(),
-            of.shown(document.level.mean),
-            of.shown(low),
-            of.shown(high),
-            document.campaigns.len()
-        )];
-        let percent = |of: Interval| {
-            let [mean, low, high] = [of.mean, of.ci95[0], of.ci95[1]].map(|v| format!("{:+.2}", 100.0 * v));
-            format!("{mean} % ({low} to {high})")
-        };
-        if let (Some(name), None) = (document.against, document.slope) {
-            lines.push(format!("dependence on {name}: too few different values of it; three are needed"));
+        let words = |one: &CampaignOfStudy| [Some(one.file.clone()), one.reassembly.clone()];
+        let mut rows = vec![texts.iter().chain(&numbers).map(|name| (*name).to_owned()).collect::<Vec<_>>()];
+        rows.extend(document.campaigns.iter().map(|one| {
+            let words = words(one).into_iter().map(Option::unwrap_or_default);
+            let numbers = row(one).into_iter().map(|value| value.map(|v| v.to_string()).unwrap_or_default());
+            words.chain(numbers).collect()
+        }));
+        write_rows(&folder.join("trend.csv"), &rows).map_err(|error| CliError::Bad(error.to_string()))?;
+        #[cfg(feature = "parquet")]
+        {
+            use crate::exchange::parquet::{ParquetFile, Stored, Values};
+            use crate::exchange::typed_table::Kind;
+            let columns: Vec<(&str, Stored)> = texts
+                .iter()
+                .map(|name| (*name, Stored::Of(Kind::Text)))
+                .chain(numbers.iter().map(|name| (*name, Stored::Of(Kind::Real))))
+                .collect();
+            let of_all = |place: usize| document.campaigns.iter().map(move |one| words(one)[place].clone());
+            let number_of_all = |place: usize| document.campaigns.iter().map(move |one| row(one)[place]);
+            let values: Vec<Values> = (0..texts.len())
+                .map(|place| Values::MaybeText(of_all(place).collect()))
+                .chain((0..numbers.len()).map(|place| Values::MaybeReal(number_of_all(place).collect())))
+                .collect();
+            ParquetFile::create(&folder.join("trend.parquet"), &columns, &[])
+                .and_then(|mut file| {
+                    file.write(&values)?;
+                    file.finish()
+                })
+                .map_err(|error| CliError::Bad(error.to_string()))?;
         }
-        if let (Some(name), Some(slope), Some(change)) = (document.against, document.slope, document.change) {
-            let [low, high] = slope.ci95;
-            lines.push(if document.power_law {
-                format!("proportional to {name} to the power {:.3} ({low:.3} to {high:.3})", slope.mean)
-            } else {
-                format!("change per unit of {name}: {}", percent(slope))
-            });
-            let largest = change.ci95[0].abs().max(change.ci95[1].abs());
-            lines.push(if document.depends == Some(true) {
-                format!("over the campaigns it changes by {}", percent(change))
-            } else {
-                format!("no change found; over the campaigns it is below {:.2} % with 95 %", 100.0 * largest)
-            });
-        }
-        let scatter = |of: Interval| {
-            let [mean, low, high] = [of.mean, of.ci95[0], of.ci95[1]].map(|v| format!("{:.2}", 100.0 * v));
-            format!("{mean} % ({low} to {high})")
-        };
-        if let Some(between) = document.between {
-            let what = if document.within.is_some() || self.reassembly.is_some() {
-                "standard deviation between reassemblies"
-            } else {
-                "standard deviation between campaigns, beyond their own errors"
-            };
-            lines.push(format!("{what}: {}", scatter(between)));
-        }
-        if let Some(within) = document.within {
-            lines.push(format!("standard deviation within a reassembly: {}", scatter(within)));
-        }
-        lines.push(format!(
-            "error that all campaigns share (spots, gains, points): {:.2} %",
-            100.0 * document.shared_std
-        ));
-        lines.push(match document.reassemblies_needed {
-            Some(needed) => format!("for a mean within ± {} %: {needed} reassemblies", self.within),
-            None => format!(
-                "a mean within ± {} % is out of reach: what all campaigns share prevents it, or more than a thousand reassemblies are needed",
-                self.within
-            ),
-        });
-        lines
+        Ok(())
     }
 }
 

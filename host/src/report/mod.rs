@@ -18,7 +18,7 @@ use std::{fs, io};
 use words::warning_sentences;
 
 pub use document::{compare, document, mode_rows, scaling};
-pub use page::{chart_style, comparison_page, figure_fragment, page, script};
+pub use page::{chart_style, comparison_page, figure_fragment, page, script, trend_figure, trend_page};
 
 pub mod cell_records;
 mod csv;

@@ -7,7 +7,7 @@
 //!
 //! Here: the answer, the checks, the comparison of two campaigns and the provenance. `joint`: the
 //! joint by substructuring; `loops`: the contact by loops; `measured`: what was measured; `modal`:
-//! the modes; `wear`: the wear runs.
+//! the modes; `trend`: a quantity of several campaigns; `wear`: the wear runs.
 
 use crate::campaign::store::SimulatedTruth;
 use crate::contact::{Contradiction, Diagnosis, Doubt, HeldOut, Interval, OfFrequency};
@@ -29,6 +29,7 @@ pub use measured::{CellRow, Cells, FrfCurve, HitRow, NoiseFloor, Place, Role, Us
 pub use modal::{
     ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, PoleOnly, SensorPlace, SessionFrequency,
 };
+pub use trend::{CampaignOfStudy, FittedPoint, StudiedQuantity, TrendOverCampaigns};
 pub use wear::{WearDecade, WearRuns};
 
 #[cfg(test)]
@@ -37,6 +38,7 @@ mod joint;
 mod loops;
 mod measured;
 mod modal;
+mod trend;
 mod wear;
 
 /// Version of the format: 1.

@@ -18,8 +18,10 @@ use base64::prelude::BASE64_STANDARD;
 use sha2::{Digest, Sha256};
 
 pub use comparison_page::comparison_page;
+pub use trend_page::{trend_figure, trend_page};
 mod comparison_page;
 mod figure_html;
+mod trend_page;
 
 const STYLE: &str = include_str!("page.css");
 const CHARTS_STYLE: &str = include_str!("../../../vendor/uplot/uPlot.min.css");

@@ -11,6 +11,7 @@ pub mod next_sentences;
 pub mod number;
 pub mod side_by_side;
 mod summary;
+pub mod trend_sentences;
 pub(super) mod warning_sentences;
 
 #[cfg(feature = "sim")]

@@ -1,0 +1,102 @@
+//! trend.json: how a quantity of several campaigns depends on a covariate, and how much it varies
+//! between reassemblies. Standard deviations and changes are relative (of the logarithm).
+
+use crate::contact::Interval;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A quantity of each campaign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+pub enum StudiedQuantity {
+    /// The contact's stiffness k_T, N/m.
+    #[value(name = "k-t")]
+    #[serde(rename = "k_t_n_per_m")]
+    KT,
+    /// The contact's damping c_T, N s/m.
+    #[value(name = "c-t")]
+    #[serde(rename = "c_t_n_s_per_m")]
+    CT,
+    /// The stiffness between the arms, N/m.
+    #[value(name = "between-arms")]
+    #[serde(rename = "between_arms_n_per_m")]
+    BetweenArms,
+    /// The coefficient of friction, of the shaker's level with the largest amplitude that slips.
+    #[value(name = "friction-coefficient")]
+    #[serde(rename = "friction_coefficient")]
+    FrictionCoefficient,
+    /// The first mode of the assembly, Hz.
+    #[value(name = "first-mode")]
+    #[serde(rename = "first_mode_hz")]
+    FirstMode,
+}
+
+/// The trend of a quantity over several campaigns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrendOverCampaigns {
+    /// The quantity.
+    pub quantity: StudiedQuantity,
+    /// The covariate.
+    pub against: Option<String>,
+    /// `line`, `power-law` or `curve`; null without a covariate.
+    pub dependence: Option<&'static str>,
+    /// The level at the covariate's mean (for a power law, its geometric mean).
+    pub level: Interval,
+    /// The covariate's mean.
+    pub at: Option<f64>,
+    /// Relative change per unit of the covariate; for a power law, the exponent; null for a curve.
+    pub slope: Option<Interval>,
+    /// Relative change from the covariate's smallest value to its largest.
+    pub change: Option<Interval>,
+    /// Whether the quantity depends on the covariate; null if it has none, or too few values.
+    pub depends: Option<bool>,
+    /// Whether a curve bends, or else could be a line; null unless a curve was fitted.
+    pub bends: Option<bool>,
+    /// Relative standard deviation between reassemblies.
+    pub between: Option<Interval>,
+    /// Relative standard deviation within a reassembly.
+    pub within: Option<Interval>,
+    /// Relative standard deviation of the error that all campaigns share.
+    pub shared_std: f64,
+    /// Reassemblies of as many campaigns as here, for a mean within ± `wanted_percent`; null if
+    /// what all share prevents it.
+    pub reassemblies_needed: Option<usize>,
+    /// How far the mean may be off, %.
+    pub wanted_percent: f64,
+    /// The campaigns.
+    pub campaigns: Vec<CampaignOfStudy>,
+    /// The fitted line or curve, from the covariate's smallest value to its largest, evenly (for a
+    /// power law, evenly in its logarithm); empty without a covariate.
+    pub fitted: Vec<FittedPoint>,
+    /// Files that are left out, each with the reason.
+    pub left_out: BTreeMap<String, String>,
+}
+
+/// One campaign of the study.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CampaignOfStudy {
+    /// Name of the campaign file.
+    pub file: String,
+    /// The quantity with its interval.
+    pub value: Interval,
+    /// The covariate.
+    pub covariate: Option<f64>,
+    /// The reassembly.
+    pub reassembly: Option<String>,
+    /// Relative standard deviation of its own error.
+    pub own_std: f64,
+    /// Relative standard deviation of the error that it shares with the others.
+    pub shared_std: f64,
+    /// Whether the rig was simulated.
+    pub simulated: bool,
+    /// What the trend gives at its covariate.
+    pub trend: Interval,
+}
+
+/// One point of the fitted line or curve.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FittedPoint {
+    /// The covariate.
+    pub covariate: f64,
+    /// The quantity.
+    pub value: Interval,
+}
