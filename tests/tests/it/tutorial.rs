@@ -10,6 +10,7 @@ const TUTORIAL: &str = include_str!("../../../docs/tutorial.md");
 const INSTALL: &str = include_str!("../../../docs/install.md");
 const ANOTHER_TOOL: &str = include_str!("../../../examples/another-tool/README.md");
 const FRICTION_LAWS: &str = include_str!("../../../docs/friction-laws.md");
+const STUDIES: &str = include_str!("../../../docs/studies.md");
 const FROM_PYFBS: &str = include_str!("../../../docs/coming-from-pyfbs.md");
 
 /// A fenced block: its kind and its lines.
@@ -146,6 +147,44 @@ fn the_friction_law_of_the_example_is_found_written_and_simulated_again() {
             assert!((again - energy).abs() < (0.02 * energy).max(3.0 * std), "{name}: {again} of {energy} J");
         }
     }
+}
+
+/// The page's study; the friction of each campaign is that of the rig's law at the energy of its
+/// wear run, and so is the law that was exported.
+#[test]
+fn the_study_finds_the_law_by_which_the_contact_wears() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/study");
+    for name in ["rig.toml", "plan.toml", "study.csv"] {
+        std::fs::copy(example.join(name), folder.path().join(name)).unwrap();
+    }
+    assert_eq!(run(STUDIES, folder.path()), 20);
+    let json = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(folder.path().join(name)).unwrap()).unwrap()
+    };
+    let energy_j = |file: &str| -> f64 {
+        let out = jointrig().args(["wear", file, "--json"]).current_dir(folder.path()).output().unwrap();
+        let wear: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        wear["wear"]["energy_j"].as_f64().unwrap()
+    };
+    // rig.toml; a level adds less than 0.1 J
+    let friction = |energy_j: f64| 0.4 * (1.0 + 0.5 * -(-energy_j / 8.0).exp_m1());
+    let trend = json("trend/trend.json");
+    for one in trend["campaigns"].as_array().unwrap() {
+        let file = one["file"].as_str().unwrap();
+        let truth = friction(if file == "fresh.jrig" { 0.0 } else { energy_j(file) });
+        let found = one["value"]["mean"].as_f64().unwrap();
+        // raw loops: 1 % for arm B's inertia, 1 % for what the level wears
+        assert!((found / truth - 1.0).abs() < 0.02, "{file}: {found}, {truth}");
+    }
+    let law = &json("law/law.json")["laws"][0];
+    let energy = energy_j("worn-5.jrig");
+    let k_t = 60e6 * (1.0 + 0.3 * -(-energy / 16.0).exp_m1());
+    let value = |name: &str| law[name].as_f64().unwrap();
+    assert!((value("k_t_n_per_m") / k_t - 1.0).abs() < 0.03, "{law} {k_t}");
+    assert!((value("limit_n") / (150.0 * friction(energy)) - 1.0).abs() < 0.02, "{law}");
+    assert!(folder.path().join("law/elements.csv").is_file());
+    assert!(folder.path().join("cycles/wear.csv").is_file());
 }
 
 #[test]
