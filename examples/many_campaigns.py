@@ -4,14 +4,15 @@
     python many_campaigns.py FOLDER [--scheduler ADDRESS] [--out DIR]
 
 Without --scheduler two workers are started on this machine; with it, the campaigns go to a cluster that sees the same folder. Writes
-campaigns.csv (a row for each campaign: k_T with its interval, N/m) and funnel.png. Any other scheduler does as well, with one command for each
-file: `jointrig analyse FILE.jrig --out DIR`.
+campaigns.csv (a row for each campaign: k_T with its interval, N/m), funnel.png, and the results of each campaign, from which `jointrig trend` tells
+what the level, a drift and the scatter are. Any other scheduler does as well, with one command for each file: `jointrig analyse FILE.jrig --out DIR`.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import json
 import math
 from pathlib import Path
 
@@ -21,13 +22,15 @@ from dask.distributed import Client, LocalCluster, get_worker
 import jointrig as jr
 
 
-def analysed(lab: jr.Lab) -> dict[str, object]:
-    """A row of the table. It runs on a worker; a Lab is a path, so that sending it costs nothing."""
+def analysed(lab: jr.Lab, folder: Path) -> dict[str, object]:
+    """A row of the table, and the results as a file. It runs on a worker; a Lab is a path, so that sending it costs nothing."""
     row: dict[str, object] = {"campaign": lab.path.name, "worker": get_worker().name}
     try:
-        contact = lab.analyse().results["answer"]["contact"]
+        results = lab.analyse().results
     except jr.Error as error:
         return row | {"why": str(error)}
+    (folder / f"{lab.path.stem}.json").write_text(json.dumps(results))
+    contact = results["answer"]["contact"]
     found = contact["k_t_n_per_m"]
     if found is None:
         return row | {"why": contact["why"]}
@@ -75,9 +78,10 @@ def main() -> None:
         client = Client(asked.scheduler)
     else:
         client = Client(LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None))
+    results = asked.out.resolve() / "results"
+    results.mkdir(parents=True, exist_ok=True)
     with client:
-        rows = client.gather(client.map(analysed, labs))
-    asked.out.mkdir(parents=True, exist_ok=True)
+        rows = client.gather(client.map(analysed, labs, folder=results))
     with (asked.out / "campaigns.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, ["campaign", "k_t_n_per_m", "ci95_low", "ci95_high", "worker", "why"])
         table.writeheader()
@@ -89,6 +93,7 @@ def main() -> None:
         low, high = (math.exp(middle + side * deviation) / 1e6 for side in (-1.96, 1.96))
         print(f"together: {math.exp(middle) / 1e6:.1f} N/µm (95 % {low:.1f}…{high:.1f})")
         funnel(known, asked.out / "funnel.png")
+        print(f"next: jointrig trend {results}/*.json --against time --out {asked.out / 'trend'}")
 
 
 if __name__ == "__main__":

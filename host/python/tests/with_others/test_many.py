@@ -1,6 +1,7 @@
 """Sixteen small campaigns of one contact on a cluster of two workers."""
 
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -58,3 +59,9 @@ def test_a_cluster_of_two_analyses_all_and_their_intervals_hold(campaigns: Path,
         [JOINTRIG, "analyse", campaigns / "specimen_01.jrig", "--out", tmp_path / "one"], capture_output=True, text=True, check=True
     ).stdout
     assert f"{float(rows[0]['k_t_n_per_m']) / 1e6:.0f} N/µm" in told
+    # and the trend over all, from the results that the workers wrote
+    results = sorted((tmp_path / "results").glob("*.json"))
+    trend = json.loads(subprocess.run([JOINTRIG, "trend", *results, "--json"], capture_output=True, text=True, check=True).stdout)
+    assert len(trend["campaigns"]) == CAMPAIGNS and trend["left_out"] == {}
+    low, high = trend["level"]["ci95"]
+    assert low <= TRUTH <= high, trend["level"]
