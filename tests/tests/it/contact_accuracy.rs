@@ -6,6 +6,7 @@ use jointrig::campaign::store::Store;
 use jointrig::contact::Interval;
 use jointrig::results::Results;
 use jointrig_hil_sim::rig::RigConfig;
+use jointrig_tests::campaign::one_second;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, print_table};
 use jointrig_tests::drawn_campaigns::{DrawnCampaign, campaigns, count, each_of, found};
 use jointrig_tests::rigs::{Drawn, Elastic, by_hand_plan, contact_plan};
@@ -119,6 +120,11 @@ fn forget_the_truth(file: &Path) {
     assert!(Store::open_read_only(file).unwrap().simulated_truth().unwrap().is_none());
 }
 
+/// The contact plan with records of one second instead of two, for the tests that always run.
+fn short_records(rig: &RigConfig) -> String {
+    one_second(&contact_plan(rig))
+}
+
 #[test]
 fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
     // One rig with a flexible clamp on each side, and one with a clamp on A alone.
@@ -127,7 +133,7 @@ fn the_contacts_own_stiffness_is_found_on_rigs_that_nobody_tuned_for() {
     let rows = std::thread::scope(|scope| {
         let one = |number| {
             let campaign = DrawnCampaign { number, seed: 0, like };
-            let file = campaign.measured(folder.path(), contact_plan, |_, _, _| {});
+            let file = campaign.measured(folder.path(), short_records, |_, _, _| {});
             let results = found(&file);
             forget_the_truth(&file);
             let blind = found(&file);
@@ -151,7 +157,7 @@ fn the_bulk_of_specimens_that_bend_is_not_taken_for_the_contact() {
     // an aluminium specimen, about which the plan states nothing
     let like = Drawn { elastic: Some(Elastic::SpecimensAndArms), ..Drawn::default() };
     let campaign = DrawnCampaign { number: 1001, seed: 0, like };
-    let row = row(campaign, campaign.results(contact_plan, |_, _, _| {}));
+    let row = row(campaign, campaign.results(short_records, |_, _, _| {}));
     let Estimate { truth, found } = row.stiffness;
     let [_, low, high] = found.unwrap_or_else(|| panic!("{row:?}"));
     assert!(low <= truth && truth <= high && high - low < 0.4 * truth, "{row:?}");

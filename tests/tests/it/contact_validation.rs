@@ -3,9 +3,10 @@
 //! estimator was run on them.
 #![allow(clippy::unwrap_used)]
 
-use jointrig::results::ContactAnswer;
+use jointrig::results::{ContactAnswer, Results};
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_hil_sim::rig::config::Patch;
+use jointrig_tests::campaign::one_second;
 use jointrig_tests::coverage::{Answer, COLUMNS, Coverage, QUALITY_COLUMNS, Quality, print_table};
 use jointrig_tests::drawn_campaigns::{count, each, results};
 use jointrig_tests::rigs::{Drawn, Elastic, contact_plan, drawn, off_centre};
@@ -21,6 +22,11 @@ fn sound(number: u64) -> RigConfig {
     let mut rig = drawn(number, Drawn { elastic: bends(number), ..Drawn::default() });
     off_centre(number, &mut rig);
     rig
+}
+
+/// As [`measured`], with records of one second instead of two, for the tests that always run.
+fn measured_shortly(number: u64, stated: &RigConfig, rig: &RigConfig) -> Results {
+    results(number, rig, &one_second(&contact_plan(stated)))
 }
 
 /// Runs `contact.toml` with the priors of `stated` on `rig`.
@@ -98,7 +104,7 @@ fn rigs_not_used_in_development() {
 fn a_contact_that_changes_while_it_is_hit_is_noticed() {
     let mut rig = RigConfig::elastic();
     rig.contact.drift_per_hit = 0.1 / HITS;
-    let found = results(1, &rig, &contact_plan(&rig));
+    let found = measured_shortly(1, &rig, &rig);
     let (drifts, answer) = (found.check("contact-steady").unwrap(), found.answer.as_ref().unwrap());
     let answer = &answer.contact;
     assert_eq!(drifts.ok, Some(false), "{}", drifts.meaning);
@@ -112,7 +118,7 @@ fn a_contact_that_changes_while_it_is_hit_is_noticed() {
 #[test]
 fn nothing_is_contradicted_on_a_rig_that_is_as_stated() {
     let rig = RigConfig::elastic();
-    let found = results(2, &rig, &contact_plan(&rig));
+    let found = measured_shortly(2, &rig, &rig);
     let steady = found.check("contact-steady").unwrap();
     assert_ne!(steady.ok, Some(false), "{}", steady.meaning);
     let answer = found.answer.unwrap().contact;
@@ -124,7 +130,7 @@ fn a_hammer_that_contradicts_the_load_cells_is_named_and_allowed_for() {
     let measured = |number, ratio: f64| {
         let mut rig = RigConfig::elastic();
         volts(&mut rig, &["force"], ratio);
-        measured(number, &rig, &rig)
+        measured_shortly(number, &rig, &rig).answer.unwrap().contact
     };
     // the load cells would show more force than the hammer gives; then, 25 % more than the plan
     // states would pass beside them
@@ -140,7 +146,7 @@ fn a_hammer_that_contradicts_the_load_cells_is_named_and_allowed_for() {
 fn a_cable_beside_the_contact_is_named_and_allowed_for() {
     let mut rig = RigConfig::elastic();
     path(&mut rig, "[\"arm_a\", \"arm_b\"]", 0.03);
-    let found = measured(5, &RigConfig::elastic(), &rig);
+    let found = measured_shortly(5, &RigConfig::elastic(), &rig).answer.unwrap().contact;
     let answer = answer(&rig, &found).expect("a k_T");
     assert!(answer.covers, "{}: {:?}", found.why, found.k_t_n_per_m);
     assert!(found.why.contains("passes beside the contact"), "{}", found.why);
