@@ -29,8 +29,20 @@ pub const WHEEL: u64 = 5_500_000;
 /// The package that builds the wheel, and those that test it where nothing else is installed.
 pub const TOOLS: [&str; 1] = ["maturin>=1.16,<2"];
 
-/// Options of maturin: the wheel has a size limit.
-pub const FOR_SIZE: [&str; 2] = ["--compression-level", "9"];
+/// Options of maturin that compile the host's own code for size: the wheel has a size limit, and
+/// the loops over samples and lines are in other packages (jointrig-analysis, pco, rustfft).
+///
+/// One unit of code generation shares what several would each contain, and takes less time in all.
+pub const FOR_SIZE: [&str; 8] = [
+    "--compression-level",
+    "9",
+    "--config",
+    "profile.release.package.jointrig.opt-level=\"s\"",
+    "--config",
+    "profile.release.package.jointrig.codegen-units=1",
+    "--config",
+    "profile.release.package.jointrig-uff.opt-level=\"s\"",
+];
 const ALONE: [&str; 3] = ["numpy", "pytest", "pytest-xdist"];
 
 /// Packages that are used together with the wheel: those of notebooks, engines that read the
