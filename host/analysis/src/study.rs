@@ -45,10 +45,9 @@ type Coefficients = SVector<f64, KNOTS>;
 type Square = SMatrix<f64, KNOTS, KNOTS>;
 
 /// How the quantity may depend on the covariate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dependence {
     /// A straight line.
-    #[default]
     Line,
     /// A smooth curve.
     Curve,
@@ -254,7 +253,7 @@ impl Grouped {
                 column.iter_mut().zip(other).for_each(|(value, other)| *value -= part * other);
             }
             // far above rounding, far below what a study of a few campaigns could see
-            if dot(&column, &column) > 1e-12 * whole {
+            if dot(&column, &column) > 1e-8 * whole {
                 orthogonal.push(column);
                 found.push(place);
             }
@@ -464,14 +463,16 @@ fn contradict_zero(estimate: &Coefficients, drawn: &[Coefficients], places: std:
         let products = drawn.iter().map(|d| (d[i] - estimate[i]) * (d[j] - estimate[j]));
         products.sum::<f64>() / drawn.len() as f64
     };
+    // in standard deviations, because the coefficients have different units
+    let std = Coefficients::from_fn(|i, _| of_draws(i, i).sqrt().max(f64::MIN_POSITIVE));
     for i in places.clone() {
         for j in places.clone() {
-            covariance[(i, j)] = of_draws(i, j);
+            covariance[(i, j)] = of_draws(i, j) / (std[i] * std[j]);
         }
     }
     let Some(inverse) = covariance.try_inverse() else { return false };
     let distance = |of: &dyn Fn(usize) -> f64| {
-        let x = Coefficients::from_fn(|i, _| if places.contains(&i) { of(i) } else { 0.0 });
+        let x = Coefficients::from_fn(|i, _| if places.contains(&i) { of(i) / std[i] } else { 0.0 });
         x.dot(&(inverse * x))
     };
     let limit = distance(&|i| estimate[i]);
