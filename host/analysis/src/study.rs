@@ -1,10 +1,10 @@
 //! Studies of several campaigns: how a quantity depends on a covariate, and how much it varies
 //! between reassemblies and within one.
 //!
-//! Model: y_i = level + f(x_i) + b_g(i) + w_i + m_i. f is a line or a smooth curve, zero at x̄. m_i is
-//! the campaign's own error, whose variance is known, w_i the variation within a reassembly and b_g
-//! that between reassemblies, all normally distributed and independent. An error that all campaigns
-//! share (the same spots, the same calibration) moves the level only.
+//! Model: y_i = level + f(x_i) + b_g(i) + w_i + m_i. f is a line or a smooth curve, zero at x̄.
+//! m_i is the campaign's own error, whose variance is known, w_i the variation within a reassembly
+//! and b_g that between reassemblies, all normally distributed and independent. An error that all
+//! campaigns share (the same spots, the same calibration) moves the level only.
 //!
 //! The curve is a natural cubic spline with four knots, evenly over the ranks of the covariate's
 //! values: a line, and two functions that bend (Hastie, Tibshirani, Friedman 2009, section 5.2.1).
@@ -872,8 +872,8 @@ mod tests {
         assert!(seen > 180, "{seen}");
     }
 
-    /// Without scatter, a natural spline with the same knots is followed exactly, and a line exactly
-    /// by any curve; beyond the last knot the curve is straight.
+    /// Values without scatter: a natural spline with the same knots, and a line, are met exactly.
+    /// Beyond the last knot the curve is straight.
     #[test]
     fn a_curve_is_the_natural_spline_and_straight_beyond_its_knots() {
         let of = |f: &dyn Fn(f64) -> f64| -> Trend {

@@ -72,8 +72,8 @@ pub struct TrendArgs {
     /// How far, %, the mean may be off with 95 %: prints how many reassemblies that needs.
     #[arg(long, value_name = "PERCENT", default_value_t = 3.0, value_parser = positive)]
     within: f64,
-    /// Folder for trend.json, trend.html, trend.svg, trend.csv and trend.parquet; created if it does
-    /// not exist.
+    /// Folder for trend.json, trend.html, trend.svg, trend.csv and trend.parquet; created if it
+    /// does not exist.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print trend.json on stdout.
