@@ -8,11 +8,15 @@ use super::output::positive;
 use crate::analyse::Wanted;
 use crate::campaign::store::Store;
 use crate::contact::Interval;
+#[cfg(feature = "parquet")]
+use crate::exchange::parquet::write_table;
 use crate::exchange::study_table::{StudyTable, read_study};
-use crate::exchange::tables_output::write_rows;
+use crate::exchange::typed_table::{Kind, Table};
 use crate::report;
 use crate::report::words::trend_sentences::{sentences, shown_as};
-use crate::results::{CampaignOfStudy, FittedPoint, StudiedQuantity, TrendOverCampaigns};
+use crate::results::{
+    CampaignOfStudy, FittedForm, FittedPoint, FoundByCampaign, StudiedQuantity, TrendOverCampaigns,
+};
 use crate::structure::Structure;
 use crate::study::{Dependence, Observation, Trend, trend};
 use crate::substructuring::joint_over_bands::NORMAL_95;
@@ -22,6 +26,7 @@ use clap::Args;
 use jiff::Timestamp;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// Largest results.json, bytes: with all curves, that of the paper's campaign has 15 MB.
@@ -110,24 +115,19 @@ impl TrendArgs {
         let table = table.map_err(|error| CliError::Bad(error.to_string()))?;
         let mut left_out = BTreeMap::new();
         let mut campaigns = Vec::new();
-        let mut started = Vec::new();
         let mut given = BTreeSet::new();
         for path in &self.files {
             let results = results_of(path)?;
             let name = name_of(path, &results);
-            let begun = started_at(&results);
             // twice the same campaign would count as two independent ones
-            if !given.insert((name.clone(), begun)) {
+            if !given.insert((name.clone(), started_at(&results))) {
                 return Err(CliError::Bad(format!(
                     "{}: the campaign {name} is given twice: leave one of them out",
                     path.display()
                 )));
             }
             match self.campaign(&name, &results, table.as_ref()) {
-                Ok(one) => {
-                    campaigns.push(one);
-                    started.push(begun);
-                }
+                Ok(one) => campaigns.push(one),
                 Err(why) => {
                     tell_line!("jointrig: left out: {name}: {why}");
                     left_out.insert(name, why);
@@ -135,9 +135,9 @@ impl TrendArgs {
             }
         }
         if self.against.as_deref() == Some("time") {
-            let first = started.iter().flatten().min().copied();
-            for (one, started) in campaigns.iter_mut().zip(&started) {
-                let (Some(first), Some(started)) = (first, started) else {
+            let first = campaigns.iter().filter_map(|one| one.started).min();
+            for one in &mut campaigns {
+                let (Some(first), Some(started)) = (first, one.started) else {
                     return Err(CliError::Bad(format!(
                         "{}: it does not state when it was started: give the time as a column of --table",
                         one.file
@@ -163,7 +163,7 @@ impl TrendArgs {
         name: &str,
         results: &Value,
         table: Option<&StudyTable>,
-    ) -> Result<CampaignOfStudy, String> {
+    ) -> Result<FoundByCampaign, String> {
         let (symbol, ..) = shown_as(self.of);
         let Some(found) = place_of(self.of, results) else {
             let why = match self.of {
@@ -214,20 +214,19 @@ impl TrendArgs {
             (Some(column), Some(row)) => Some(row.text(column)?.to_owned()),
             _ => None,
         };
-        Ok(CampaignOfStudy {
+        Ok(FoundByCampaign {
             file: name.into(),
+            started: started_at(results),
             value,
             covariate,
             reassembly,
             own_std: std * own.sqrt(),
             shared_std: std * (1.0 - own).max(0.0).sqrt(),
             simulated: results.pointer("/source/simulated").and_then(Value::as_bool) == Some(true),
-            // known after the fit
-            trend: value,
         })
     }
 
-    fn observations(&self, campaigns: &[CampaignOfStudy]) -> Result<Vec<Observation>, CliError> {
+    fn observations(&self, campaigns: &[FoundByCampaign]) -> Result<Vec<Observation>, CliError> {
         let mut groups: BTreeMap<&str, usize> = BTreeMap::new();
         let mut observations = Vec::new();
         for (number, one) in campaigns.iter().enumerate() {
@@ -258,7 +257,7 @@ impl TrendArgs {
         found: &Trend,
         observations: &[Observation],
         shared_std: f64,
-        mut campaigns: Vec<CampaignOfStudy>,
+        campaigns: Vec<FoundByCampaign>,
         left_out: BTreeMap<String, String>,
     ) -> TrendOverCampaigns {
         let covariates = || observations.iter().map(|one| one.covariate);
@@ -266,9 +265,10 @@ impl TrendArgs {
         let last = covariates().fold(f64::NEG_INFINITY, f64::max);
         let each = (found.campaigns as f64 / found.groups as f64).round() as usize;
         let stated = |x: f64| if self.power_law { x.exp() } else { x };
-        for (one, observation) in campaigns.iter_mut().zip(observations) {
-            one.trend = exponential(found.line(observation.covariate));
-        }
+        let with_trend = |(one, observation): (FoundByCampaign, &Observation)| CampaignOfStudy {
+            found: one,
+            trend: exponential(found.line(observation.covariate)),
+        };
         let fitted = |point: usize| {
             let x = first + (last - first) * point as f64 / (FITTED - 1) as f64;
             FittedPoint { covariate: stated(x), value: exponential(found.line(x)) }
@@ -278,9 +278,9 @@ impl TrendArgs {
             quantity: self.of,
             against: self.against.clone(),
             dependence: self.against.as_ref().map(|_| match (self.power_law, self.curve) {
-                (true, _) => "power-law",
-                (_, true) => "curve",
-                _ => "line",
+                (true, _) => FittedForm::PowerLaw,
+                (_, true) => FittedForm::Curve,
+                _ => FittedForm::Line,
             }),
             level: exponential(found.level),
             at: self.against.is_some().then(|| stated(found.at)),
@@ -293,7 +293,7 @@ impl TrendArgs {
             shared_std,
             reassemblies_needed: found.reassemblies_for((1.0 + 0.01 * self.within).ln(), each),
             wanted_percent: self.within,
-            campaigns,
+            campaigns: campaigns.into_iter().zip(observations).map(with_trend).collect(),
             fitted: if change.is_some() { (0..FITTED).map(fitted).collect() } else { Vec::new() },
             left_out,
         }
@@ -319,48 +319,26 @@ impl TrendArgs {
 
     /// trend.csv and trend.parquet, a row for each campaign.
     fn tables(&self, folder: &Path, document: &TrendOverCampaigns) -> Result<(), CliError> {
-        let field = serde_json::to_value(self.of).ok().and_then(|name| name.as_str().map(str::to_owned));
-        let field = field.unwrap_or_default();
         let covariate = self.against.as_deref().unwrap_or("covariate");
-        let texts = ["file", "reassembly"];
-        let numbers = [covariate, &field, "low", "high", "trend", "trend_low", "trend_high"];
-        let row = |one: &CampaignOfStudy| {
-            let [value, trend] =
-                [&one.value, &one.trend].map(|of| [of.mean, of.ci95[0], of.ci95[1]].map(Some));
-            let mut row = vec![one.covariate];
-            row.extend(value.into_iter().chain(trend));
-            row
-        };
-        let words = |one: &CampaignOfStudy| [Some(one.file.clone()), one.reassembly.clone()];
-        let mut rows = vec![texts.iter().chain(&numbers).map(|name| (*name).to_owned()).collect::<Vec<_>>()];
-        rows.extend(document.campaigns.iter().map(|one| {
-            let words = words(one).into_iter().map(Option::unwrap_or_default);
-            let numbers = row(one).into_iter().map(|value| value.map(|v| v.to_string()).unwrap_or_default());
-            words.chain(numbers).collect()
-        }));
-        write_rows(&folder.join("trend.csv"), &rows).map_err(|error| CliError::Bad(error.to_string()))?;
-        #[cfg(feature = "parquet")]
-        {
-            use crate::exchange::parquet::{ParquetFile, Stored, Values};
-            use crate::exchange::typed_table::Kind;
-            let columns: Vec<(&str, Stored)> = texts
-                .iter()
-                .map(|name| (*name, Stored::Of(Kind::Text)))
-                .chain(numbers.iter().map(|name| (*name, Stored::Of(Kind::Real))))
-                .collect();
-            let of_all = |place: usize| document.campaigns.iter().map(move |one| words(one)[place].clone());
-            let number_of_all = |place: usize| document.campaigns.iter().map(move |one| row(one)[place]);
-            let values: Vec<Values> = (0..texts.len())
-                .map(|place| Values::MaybeText(of_all(place).collect()))
-                .chain((0..numbers.len()).map(|place| Values::MaybeReal(number_of_all(place).collect())))
-                .collect();
-            ParquetFile::create(&folder.join("trend.parquet"), &columns, &[])
-                .and_then(|mut file| {
-                    file.write(&values)?;
-                    file.finish()
-                })
-                .map_err(|error| CliError::Bad(error.to_string()))?;
+        let numbers = [covariate, self.of.field(), "low", "high", "trend", "trend_low", "trend_high"];
+        let mut columns = vec![("file", Kind::Text), ("reassembly", Kind::Text)];
+        columns.extend(numbers.map(|name| (name, Kind::Real)));
+        let mut table = Table::new(&columns);
+        for one in &document.campaigns {
+            let mut row = vec![
+                one.found.file.clone().into(),
+                one.found.reassembly.clone().into(),
+                one.found.covariate.into(),
+            ];
+            for of in [one.found.value, one.trend] {
+                row.extend([of.mean, of.ci95[0], of.ci95[1]].map(Into::into));
+            }
+            table.push(row);
         }
+        let failed = |error: &dyn Display| CliError::Bad(error.to_string());
+        table.write_csv(&folder.join("trend.csv")).map_err(|error| failed(&error))?;
+        #[cfg(feature = "parquet")]
+        write_table(&folder.join("trend.parquet"), &table, &[]).map_err(|error| failed(&error))?;
         Ok(())
     }
 }

@@ -185,10 +185,10 @@ pub fn write_table(
     notes: &[(&str, String)],
 ) -> Result<Written, ParquetFileError> {
     let columns: Vec<(&str, Stored)> =
-        table.columns().iter().map(|(name, kind)| (*name, Stored::Of(*kind))).collect();
+        table.columns().iter().map(|(name, kind)| (name.as_str(), Stored::Of(*kind))).collect();
     let mut file = ParquetFile::create(path, &columns, notes)?;
     for rows in table.rows().chunks(ROWS_AT_ONCE) {
-        let of = |(place, (_, kind)): (usize, &(&str, Kind))| {
+        let of = |(place, (_, kind)): (usize, &(String, Kind))| {
             values(*kind, rows.iter().map(|row| &row[place])).ok_or_else(|| ParquetFileError::Library {
                 path: path.into(),
                 what: format!("column {place} contains a value of the wrong type"),

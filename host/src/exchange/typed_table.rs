@@ -76,13 +76,14 @@ impl<T: Into<Value>> From<Option<T>> for Value {
 /// Rows under typed columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    columns: &'static [(&'static str, Kind)],
+    columns: Vec<(String, Kind)>,
     rows: Vec<Vec<Value>>,
 }
 
 impl Table {
     /// A table without rows.
-    pub fn new(columns: &'static [(&'static str, Kind)]) -> Self {
+    pub fn new(columns: &[(&str, Kind)]) -> Self {
+        let columns = columns.iter().map(|(name, kind)| ((*name).to_owned(), *kind)).collect();
         Self { columns, rows: Vec::new() }
     }
 
@@ -97,8 +98,8 @@ impl Table {
     }
 
     /// Names and kinds of the columns.
-    pub fn columns(&self) -> &'static [(&'static str, Kind)] {
-        self.columns
+    pub fn columns(&self) -> &[(String, Kind)] {
+        &self.columns
     }
 
     /// The rows.
@@ -111,7 +112,7 @@ impl Table {
     /// # Errors
     /// [`TableError`].
     pub fn write_csv(&self, path: &Path) -> Result<(), TableError> {
-        let heading = self.columns.iter().map(|(name, _)| (*name).to_owned()).collect::<Vec<_>>();
+        let heading = self.columns.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
         let rows = self.rows.iter().map(|row| row.iter().map(Value::text).collect::<Vec<_>>());
         write_rows_of(path, std::iter::once(heading).chain(rows))
     }

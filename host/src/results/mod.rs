@@ -29,7 +29,9 @@ pub use measured::{CellRow, Cells, FrfCurve, HitRow, NoiseFloor, Place, Role, Us
 pub use modal::{
     ChartPoles, FirstMode, HitFrequency, ModalFit, ModeRow, Moving, PoleOnly, SensorPlace, SessionFrequency,
 };
-pub use trend::{CampaignOfStudy, FittedPoint, StudiedQuantity, TrendOverCampaigns};
+pub use trend::{
+    CampaignOfStudy, FittedForm, FittedPoint, FoundByCampaign, StudiedQuantity, TrendOverCampaigns,
+};
 pub use wear::{WearDecade, WearRuns};
 
 #[cfg(test)]

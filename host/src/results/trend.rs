@@ -2,32 +2,58 @@
 //! between reassemblies. Standard deviations and changes are relative (of the logarithm).
 
 use crate::contact::Interval;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// A quantity of each campaign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum StudiedQuantity {
     /// The contact's stiffness k_T, N/m.
     #[value(name = "k-t")]
-    #[serde(rename = "k_t_n_per_m")]
     KT,
     /// The contact's damping c_T, N s/m.
     #[value(name = "c-t")]
-    #[serde(rename = "c_t_n_s_per_m")]
     CT,
     /// The stiffness between the arms, N/m.
     #[value(name = "between-arms")]
-    #[serde(rename = "between_arms_n_per_m")]
     BetweenArms,
     /// The coefficient of friction, of the shaker's level with the largest amplitude that slips.
     #[value(name = "friction-coefficient")]
-    #[serde(rename = "friction_coefficient")]
     FrictionCoefficient,
     /// The first mode of the assembly, Hz.
     #[value(name = "first-mode")]
-    #[serde(rename = "first_mode_hz")]
     FirstMode,
+}
+
+impl StudiedQuantity {
+    /// Its name with its unit, as in trend.json and as a column of tables.
+    pub fn field(self) -> &'static str {
+        match self {
+            Self::KT => "k_t_n_per_m",
+            Self::CT => "c_t_n_s_per_m",
+            Self::BetweenArms => "between_arms_n_per_m",
+            Self::FrictionCoefficient => "friction_coefficient",
+            Self::FirstMode => "first_mode_hz",
+        }
+    }
+}
+
+impl Serialize for StudiedQuantity {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.field())
+    }
+}
+
+/// What was fitted to the quantity over the covariate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FittedForm {
+    /// A line.
+    Line,
+    /// A line over the covariate's logarithm.
+    PowerLaw,
+    /// A natural cubic spline.
+    Curve,
 }
 
 /// The trend of a quantity over several campaigns.
@@ -37,8 +63,8 @@ pub struct TrendOverCampaigns {
     pub quantity: StudiedQuantity,
     /// The covariate.
     pub against: Option<String>,
-    /// `line`, `power-law` or `curve`; null without a covariate.
-    pub dependence: Option<&'static str>,
+    /// What was fitted; null without a covariate.
+    pub dependence: Option<FittedForm>,
     /// The level at the covariate's mean (for a power law, its geometric mean).
     pub level: Interval,
     /// The covariate's mean.
@@ -74,8 +100,21 @@ pub struct TrendOverCampaigns {
 /// One campaign of the study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CampaignOfStudy {
+    /// What it found.
+    #[serde(flatten)]
+    pub found: FoundByCampaign,
+    /// What the trend gives at its covariate.
+    pub trend: Interval,
+}
+
+/// The quantity as one campaign found it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FoundByCampaign {
     /// Name of the campaign file.
     pub file: String,
+    /// When it was started; results.json of the campaign states it.
+    #[serde(skip)]
+    pub started: Option<jiff::Timestamp>,
     /// The quantity with its interval.
     pub value: Interval,
     /// The covariate.
@@ -88,8 +127,6 @@ pub struct CampaignOfStudy {
     pub shared_std: f64,
     /// Whether the rig was simulated.
     pub simulated: bool,
-    /// What the trend gives at its covariate.
-    pub trend: Interval,
 }
 
 /// One point of the fitted line or curve.

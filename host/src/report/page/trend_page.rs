@@ -5,8 +5,9 @@ use super::{figure_html, shell};
 use crate::contact::Interval;
 use crate::report::figure::{Along, Axis, Figure, Mark, Marker, Packed, Panel, Role, Shape, Source};
 use crate::report::html::Html;
+use crate::report::tables;
 use crate::report::words::trend_sentences::{covariate_unit, sentences, shown_as, value};
-use crate::results::{CampaignOfStudy, TrendOverCampaigns};
+use crate::results::{CampaignOfStudy, FittedForm, TrendOverCampaigns};
 use std::collections::BTreeSet;
 
 /// The whole page as HTML.
@@ -27,7 +28,9 @@ pub fn trend_page(trend: &TrendOverCampaigns) -> String {
     body.raw("</div>");
     figure_html::figure(&mut body, &figure, 2);
     body.raw("</section>");
-    campaigns(&mut body, trend);
+    body.raw("<section id=\"campaigns\"><h2>The campaigns</h2>");
+    body.raw(&tables::campaigns_of_study(trend));
+    body.raw("</section>");
     if !trend.left_out.is_empty() {
         body.raw("<section><h2>Left out</h2><ul>");
         for (file, why) in &trend.left_out {
@@ -37,59 +40,16 @@ pub fn trend_page(trend: &TrendOverCampaigns) -> String {
     }
     body.raw("</main>");
     let banner = format!("{} campaigns", trend.campaigns.len());
-    let simulated = trend.campaigns.iter().any(|one| one.simulated);
+    let simulated = trend.campaigns.iter().any(|one| one.found.simulated);
     shell(&title, &banner, simulated, &body.finish(), std::iter::once(&figure))
-}
-
-/// The campaigns as a table.
-fn campaigns(body: &mut Html, trend: &TrendOverCampaigns) {
-    let (symbol, unit, factor) = shown_as(trend.quantity);
-    let of = |text: &str| if unit.is_empty() { text.to_owned() } else { format!("{text}, {unit}") };
-    let mut heads = vec!["file".to_owned()];
-    heads.extend(trend.campaigns.iter().any(|one| one.reassembly.is_some()).then(|| "reassembly".into()));
-    heads.extend(trend.against.clone());
-    heads.extend([of(symbol), "95 % interval".into(), of("trend"), "95 % interval".into()]);
-    body.raw("<section id=\"campaigns\"><h2>The campaigns</h2><div class=\"scroll\"><table><thead><tr>");
-    for head in &heads {
-        body.element("th scope=\"col\"", head);
-    }
-    body.raw("</tr></thead><tbody>");
-    let both = |of: &Interval| {
-        let [mean, low, high] = [of.mean, of.ci95[0], of.ci95[1]].map(|v| four_digits(factor * v));
-        // a plain number has no interval of its own
-        let known = of.ci95[0] < of.ci95[1];
-        [mean, if known { format!("{low} to {high}") } else { "–".into() }]
-    };
-    let grouped = heads.get(1).is_some_and(|head| head == "reassembly");
-    for one in &trend.campaigns {
-        body.raw("<tr>");
-        body.element("td", &one.file);
-        if grouped {
-            body.element("td", one.reassembly.as_deref().unwrap_or_default());
-        }
-        if trend.against.is_some() {
-            body.element("td", &one.covariate.map(four_digits).unwrap_or_default());
-        }
-        for text in both(&one.value).iter().chain(&both(&one.trend)) {
-            body.element("td", text);
-        }
-        body.raw("</tr>");
-    }
-    body.raw("</tbody></table></div></section>");
-}
-
-/// A number with four significant digits.
-fn four_digits(value: f64) -> String {
-    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
-    rounded.to_string()
 }
 
 /// Every campaign with its interval, and the fitted line or curve with its 95 % band. Without a
 /// covariate the campaigns stand in the order given, with the band of their level.
 pub fn trend_figure(trend: &TrendOverCampaigns) -> Figure {
     let (symbol, unit, factor) = shown_as(trend.quantity);
-    let power = trend.dependence == Some("power-law");
-    let place = |(number, one): (usize, &CampaignOfStudy)| one.covariate.unwrap_or(number as f64 + 1.0);
+    let power = trend.dependence == Some(FittedForm::PowerLaw);
+    let place = |(number, one): (usize, &CampaignOfStudy)| one.found.covariate.unwrap_or(number as f64 + 1.0);
     let at: Vec<f64> = trend.campaigns.iter().enumerate().map(place).collect();
     let fitted: Vec<(f64, Interval)> = if trend.fitted.is_empty() {
         let [low, high] = [f64::min, f64::max].map(|of| at.iter().copied().reduce(of).unwrap_or_default());
@@ -97,7 +57,8 @@ pub fn trend_figure(trend: &TrendOverCampaigns) -> Figure {
     } else {
         trend.fitted.iter().map(|point| (point.covariate, point.value)).collect()
     };
-    let intervals = || trend.campaigns.iter().map(|one| one.value).chain(fitted.iter().map(|(_, of)| *of));
+    let intervals =
+        || trend.campaigns.iter().map(|one| one.found.value).chain(fitted.iter().map(|(_, of)| *of));
     let range = |values: &mut dyn Iterator<Item = f64>| {
         let [low, high] = values
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
@@ -121,8 +82,9 @@ pub fn trend_figure(trend: &TrendOverCampaigns) -> Figure {
     let ribbon = Shape::Ribbon { x: along(), low: end(0), high: end(1) };
     let what = match trend.dependence {
         None => "level",
-        Some("power-law") => "power law",
-        Some(other) => other,
+        Some(FittedForm::Line) => "line",
+        Some(FittedForm::PowerLaw) => "power law",
+        Some(FittedForm::Curve) => "curve",
     };
     // paths in trend.json
     let of_fit = if trend.fitted.is_empty() { "/level" } else { "/fitted/*/value" };
@@ -139,20 +101,21 @@ pub fn trend_figure(trend: &TrendOverCampaigns) -> Figure {
                 .from("y", format!("{of_fit}/mean"), factor),
         );
     let groups: BTreeSet<Option<&str>> =
-        trend.campaigns.iter().map(|one| one.reassembly.as_deref()).collect();
+        trend.campaigns.iter().map(|one| one.found.reassembly.as_deref()).collect();
     for (number, group) in groups.iter().enumerate() {
-        let own = || trend.campaigns.iter().zip(&at).filter(|(one, _)| one.reassembly.as_deref() == *group);
+        let own =
+            || trend.campaigns.iter().zip(&at).filter(|(one, _)| one.found.reassembly.as_deref() == *group);
         let says = own().map(|(one, _)| {
-            let [mean, low, high] =
-                [one.value.mean, one.value.ci95[0], one.value.ci95[1]].map(|v| value(trend.quantity, v));
-            let known = one.value.ci95[0] < one.value.ci95[1];
+            let [mean, low, high] = [one.found.value.mean, one.found.value.ci95[0], one.found.value.ci95[1]]
+                .map(|v| value(trend.quantity, v));
+            let known = one.found.value.ci95[0] < one.found.value.ci95[1];
             let interval = if known { format!(" ({low} to {high})") } else { String::new() };
-            format!("{}: {mean}{interval}", one.file)
+            format!("{}: {mean}{interval}", one.found.file)
         });
         let role = if group.is_some() { Role::group(number) } else { Role::Measured };
         panel.marks.push(
-            Mark::points(role, Marker::Dot, own().map(|(one, x)| [*x, factor * one.value.mean]))
-                .barred("y", own().map(|(one, _)| one.value.ci95.map(|end| factor * end)))
+            Mark::points(role, Marker::Dot, own().map(|(one, x)| [*x, factor * one.found.value.mean]))
+                .barred("y", own().map(|(one, _)| one.found.value.ci95.map(|end| factor * end)))
                 .saying(says.collect())
                 .estimate("y", "/campaigns/*/value/mean", factor)
                 .named(group.map_or_else(|| "campaigns, 95 %".into(), |name| format!("reassembly {name}"))),
@@ -168,7 +131,7 @@ pub fn trend_figure(trend: &TrendOverCampaigns) -> Figure {
     figure.from = Source {
         records: Vec::new(),
         file: "trend.json".into(),
-        simulated: trend.campaigns.iter().any(|one| one.simulated),
+        simulated: trend.campaigns.iter().any(|one| one.found.simulated),
         version: env!("CARGO_PKG_VERSION").into(),
     };
     figure

@@ -13,6 +13,7 @@ pub use joint::{joint, refusals};
 pub use loops::{decay, hysteresis, side_by_side, static_arm};
 pub use modes::modes;
 pub use provenance::{calibrations, completeness, provenance};
+pub use study::campaigns_of_study;
 pub use wear::wear;
 
 mod checks;
@@ -20,6 +21,7 @@ mod joint;
 mod loops;
 mod modes;
 mod provenance;
+mod study;
 mod wear;
 
 /// Text for an unknown value.

@@ -1,7 +1,7 @@
 //! A trend over several campaigns in words.
 
 use crate::contact::Interval;
-use crate::results::{StudiedQuantity, TrendOverCampaigns};
+use crate::results::{FittedForm, StudiedQuantity, TrendOverCampaigns, rounded};
 
 /// Symbol, unit in which it is shown, and factor from SI to that unit.
 pub fn shown_as(quantity: StudiedQuantity) -> (&'static str, &'static str, f64) {
@@ -48,9 +48,7 @@ pub fn sentences(trend: &TrendOverCampaigns) -> Vec<String> {
     let at = match (&trend.against, trend.at) {
         (Some(name), Some(at)) => {
             let unit = covariate_unit(name);
-            // five significant digits
-            let at = format!("{at:.4e}").parse::<f64>().map_or_else(|_| at.to_string(), |at| at.to_string());
-            format!(" at {name} {at} {unit}").trim_end().to_owned()
+            format!(" at {name} {} {unit}", rounded(at, 5)).trim_end().to_owned()
         }
         _ => String::new(),
     };
@@ -64,7 +62,7 @@ pub fn sentences(trend: &TrendOverCampaigns) -> Vec<String> {
         format!("{mean} % ({low} to {high})")
     };
     if let Some(between) = trend.between {
-        let grouped = trend.campaigns.iter().any(|one| one.reassembly.is_some());
+        let grouped = trend.campaigns.iter().any(|one| one.found.reassembly.is_some());
         let what = if trend.within.is_some() || grouped {
             "standard deviation between reassemblies"
         } else {
@@ -99,7 +97,7 @@ fn dependence(trend: &TrendOverCampaigns, name: &str) -> Vec<String> {
     if let Some(slope) = trend.slope {
         let [low, high] = slope.ci95;
         lines.push(match (trend.dependence, name) {
-            (Some("power-law"), _) => {
+            (Some(FittedForm::PowerLaw), _) => {
                 format!("proportional to {name} to the power {:.3} ({low:.3} to {high:.3})", slope.mean)
             }
             (_, "time") => format!("change per day: {}", percent(slope)),
