@@ -323,21 +323,29 @@ fn lines(document: &LawDocument<'_>) -> Vec<String> {
     lines
 }
 
+/// An interval that reaches to this many times the value says nothing about the other end.
+const NO_LIMIT: f64 = 1000.0;
+
 fn law_lines(judged: &JudgedLaw) -> Vec<String> {
     let fit = &judged.fit;
     let verdict = if judged.refusals.is_empty() { "accepted" } else { "refused" };
     let mut lines =
         vec![format!("{}: {verdict}, BIC {:.1}, weight {:.3}", fit.law.kind(), fit.bic, judged.weight)];
     lines.extend(fit.parameters.iter().map(|p| {
+        let (name, factor, unit, places) = match p.name {
+            "k_t_n_per_m" => ("k_T", 1e-6, " N/µm", 2),
+            "limit_n" => ("limit", 1.0, " N", 2),
+            name => (name, 1.0, "", 4),
+        };
+        let number = |value: f64| format!("{:.places$}", factor * value);
         let [low, high] = p.ci95;
+        let interval = if high > NO_LIMIT * p.value.abs() {
+            format!("from {}, no upper limit", number(low))
+        } else {
+            format!("{} to {}", number(low), number(high))
+        };
         let unsure = if p.identified { "" } else { " (not identified)" };
-        match p.name {
-            "k_t_n_per_m" => {
-                format!("  k_T {:.2} N/µm ({:.2} to {:.2}){unsure}", 1e-6 * p.value, 1e-6 * low, 1e-6 * high)
-            }
-            "limit_n" => format!("  limit {:.2} N ({low:.2} to {high:.2}){unsure}", p.value),
-            name => format!("  {name} {:.4} ({low:.4} to {high:.4}){unsure}", p.value),
-        }
+        format!("  {name} {}{unit} ({interval}){unsure}", number(p.value))
     }));
     lines.extend(judged.refusals.iter().map(|refusal| format!("  refused: {}", refusal_in_words(refusal))));
     lines
