@@ -4,13 +4,14 @@
 
 use super::guard::{Refusal, from_here, token};
 use super::{Problem, Shared, edit, page};
+use crate::analyse;
 use crate::campaign::store::Store;
 use crate::campaign::store::error::StoreError;
 use crate::live::frames::Looker;
 use crate::live::numbers::drawn;
 use crate::live::{figures, numbers};
-use crate::report::figure;
 use crate::report::figure::Figure;
+use crate::report::{self, figure};
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
@@ -39,6 +40,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/{of}/{id}/{name}", get(of_one))
         .route("/api/matrix", get(matrix))
         .route("/api/now/shaker", get(of_shaker))
+        .route("/api/wear", get(of_wear))
         .route("/api/log", get(log))
         .layer(from_fn_with_state(shared.clone(), with_token));
     let edits = edit::routes()
@@ -147,13 +149,29 @@ async fn of_shaker(State(shared): State<Arc<Shared>>) -> Result<Response, Proble
     sent(figure.map(|figure| drawn(&Figure { from, ..figure })))
 }
 
+/// The wear runs along their cycles, from the current content of the file.
+async fn of_wear(State(shared): State<Arc<Shared>>) -> Result<Response, Problem> {
+    made(move || {
+        let store = shared.store()?;
+        Ok(from_file(report::wear_figure(&analyse::wear::curve(&store)?), &store, None)?)
+    })
+    .await
+}
+
 /// Figures of a record or a cell, from the current content of the file.
 async fn of_one(
     State(shared): State<Arc<Shared>>,
     Path((of, id, name)): Path<(String, i64, String)>,
 ) -> Result<Response, Problem> {
-    // on a separate thread: a cell's spectra take long, and other messages must not wait for them
-    let made = tokio::task::spawn_blocking(move || one(&shared, &of, id, &name)).await;
+    made(move || one(&shared, &of, id, &name)).await
+}
+
+/// Responds with a figure that is made on a separate thread: a cell's spectra take long, and other
+/// messages must not wait for them.
+async fn made(
+    make: impl FnOnce() -> Result<Option<Figure>, Problem> + Send + 'static,
+) -> Result<Response, Problem> {
+    let made = tokio::task::spawn_blocking(make).await;
     let broken =
         |_| Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "the figure could not be made", "report this");
     sent(made.map_err(broken)??.as_ref().map(drawn))

@@ -146,6 +146,7 @@ fn all_but_hits(store: &Store, records: &[Result<RecordRow, Damaged>]) -> Result
             left: left(&cells, &tally, records),
             lost_scans: link.get("scans_lost").copied().unwrap_or(0),
             recovered_scans: link.get("scans_recovered").copied().unwrap_or(0),
+            wear_cycles: store.wear_total()?.cycles,
         },
         cells: cells.iter().map(|row| count(row, &tally)).collect(),
         levels: store.levels()?.iter().flatten().map(level).collect(),

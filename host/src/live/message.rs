@@ -118,6 +118,8 @@ pub struct Progress {
     pub lost_scans: u64,
     /// Scans that were sent again.
     pub recovered_scans: u64,
+    /// Cycles of wear runs in the file.
+    pub wear_cycles: u64,
 }
 
 /// Time left at the pace of the last hits, s.

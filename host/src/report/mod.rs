@@ -8,7 +8,7 @@
 
 use crate::analyse::{AnalyseError, Findings, Missing, Progress, Wanted, analyse};
 use crate::campaign::store::Store;
-use crate::results::{Compared, Place, Results};
+use crate::results::{Compared, Place, Results, WearMeans};
 use crate::structure::Structure;
 use crate::substructuring::Frf;
 use std::fs::File;
@@ -45,6 +45,11 @@ pub const FIGURES_FOLDER: &str = "figures";
 /// All figures for which these results have the data.
 pub fn all_figures(results: &Results) -> Vec<figure::Figure> {
     figures::all(results)
+}
+
+/// A wear run along its cycles; `None` before two points of its curve.
+pub fn wear_figure(curve: &[WearMeans]) -> Option<figure::Figure> {
+    figures::wear(curve)
 }
 
 /// A file format for figures as separate files.

@@ -215,6 +215,37 @@ fn reconstruction() -> Reconstruction {
     }
 }
 
+/// A contact that sticks for 300 cycles, then slips and wears.
+fn wear() -> WearRuns {
+    let one = |place: i32| {
+        let last = (100.0 * 1.2_f64.powi(place)).round();
+        let slips = last > 300.0;
+        let stiffness = 6e7 * (1.0 + 0.05 * (last / 100.0).ln());
+        let coefficient = 0.4 + 0.02 * (last / 100.0).ln();
+        WearMeans {
+            first: last as u64 - 99,
+            last: last as u64,
+            slipping: if slips { 100 } else { 0 },
+            k_t_n_per_m: slips.then_some(stiffness),
+            tangent_n_per_m: (!slips).then_some(stiffness),
+            friction_n: slips.then_some(150.0 * coefficient),
+            friction_coefficient: slips.then_some(coefficient),
+            amplitude_m: Some(4e-6),
+            energy_j: 0.08,
+            energy_to_j: 8e-4 * last,
+        }
+    };
+    let curve: Vec<WearMeans> = (0..40).map(one).collect();
+    WearRuns {
+        cycles: curve[39].last,
+        energy_j: curve[39].energy_to_j,
+        unmeasured: 0,
+        loops: 40,
+        decades: vec![curve[0].clone(), curve[20].clone()],
+        curve,
+    }
+}
+
 /// All parts together: the default rig's numbers, with a little noise.
 pub fn results() -> Results {
     let names =
@@ -302,6 +333,7 @@ pub fn results() -> Results {
     results.hysteresis.extend(levels());
     results.shaker_loops =
         [(100.0, 0.0), (200.0, 65.0), (250.0, 2.0)].map(|(f, lag)| shaker_loop(f, lag)).to_vec();
+    results.wear = Some(wear());
     results.static_arm = Some(Identified {
         correction: crate::hysteresis::Correction { effective_mass_kg: 1.74, parallel_path: 0.0133 },
         basis: crate::hysteresis::static_arm::CorrectionSource::Hits,

@@ -32,7 +32,7 @@ pub use modal::{
 pub use trend::{
     CampaignOfStudy, FittedForm, FittedPoint, FoundByCampaign, StudiedQuantity, TrendOverCampaigns,
 };
-pub use wear::{WearDecade, WearRuns};
+pub use wear::{WearMeans, WearRuns};
 
 #[cfg(test)]
 pub(crate) mod example_tests;
@@ -89,7 +89,7 @@ pub struct Results {
     pub first_mode: Option<FirstMode>,
     /// The contact by loops.
     pub hysteresis: Vec<Hysteresis>,
-    /// The wear runs of a campaign, by decades of cycles.
+    /// The wear runs of a campaign.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wear: Option<WearRuns>,
     /// Whether the numbers are credible.

@@ -1,4 +1,4 @@
-//! The wear runs of a campaign by decades of cycles.
+//! The wear runs of a campaign: by decades of cycles, and along the cycles.
 
 use serde::Serialize;
 
@@ -15,12 +15,15 @@ pub struct WearRuns {
     /// Raw loops kept.
     pub loops: u64,
     /// Cycles 1 to 9, 10 to 99 and so on.
-    pub decades: Vec<WearDecade>,
+    pub decades: Vec<WearMeans>,
+    /// Blocks of some cycles (those of a second), evenly over the logarithm of their number; the
+    /// last one is the newest.
+    pub curve: Vec<WearMeans>,
 }
 
-/// Means and sums over a decade of cycles.
+/// Means and sums over consecutive cycles.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct WearDecade {
+pub struct WearMeans {
     /// Number of the first cycle.
     pub first: u64,
     /// Number of the last cycle.
@@ -37,8 +40,8 @@ pub struct WearDecade {
     pub friction_coefficient: Option<f64>,
     /// Amplitude of Δx, mean over all measured cycles, m.
     pub amplitude_m: Option<f64>,
-    /// Energy dissipated in the decade, J.
+    /// Energy dissipated in them, J.
     pub energy_j: f64,
-    /// Energy dissipated up to its end, J.
+    /// Energy dissipated up to the last of them, J.
     pub energy_to_j: f64,
 }

@@ -12,7 +12,9 @@ use std::time::{Duration, Instant};
 
 use jointrig::campaign::store::Store;
 use jointrig::campaign::store::wear_table::WearBlockRow;
+use jointrig_tests::browser::{Browser, Look};
 use jointrig_tests::command::{Served, jointrig};
+use jointrig_tests::live;
 
 /// k_T (N/m), μ, N (N), Δx (m) of the simulated run.
 const K: f64 = 6e7;
@@ -230,6 +232,41 @@ fn a_limit_or_the_user_ends_a_run_and_the_result_is_one_document() {
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let csv = std::fs::read_to_string(to.join("wear.csv")).unwrap();
     assert_eq!(csv.lines().count() as u64, 1 + second["wear"]["cycles"].as_u64().unwrap());
+    // the curve's points are the means over their cycles
+    let rows: Vec<Vec<f64>> = csv
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').map(|field| field.parse().unwrap_or(f64::NAN)).collect())
+        .collect();
+    let heads: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    let place = |name: &str| heads.iter().position(|head| *head == name).unwrap();
+    let curve = second["wear"]["curve"].as_array().unwrap();
+    assert_eq!(curve.last().unwrap()["last"], second["wear"]["cycles"]);
+    assert!(
+        curve.len() > 2 && curve.windows(2).all(|two| two[1]["first"].as_u64() > two[0]["last"].as_u64())
+    );
+    for point in curve {
+        let [first, last] = ["first", "last"].map(|name| point[name].as_u64().unwrap() as usize);
+        let slipping = || rows[first - 1..last].iter().filter(|row| !row[place("friction_n")].is_nan());
+        let mean = |column: usize| {
+            let (sum, count) = slipping()
+                .map(|row| row[column])
+                .filter(|value| !value.is_nan())
+                .fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            sum / count
+        };
+        assert_eq!(point["slipping"].as_u64().unwrap() as usize, slipping().count());
+        for (field, column) in
+            [("k_t_n_per_m", "stiffness_n_per_m"), ("friction_coefficient", "friction_coefficient")]
+        {
+            match point[field].as_f64() {
+                Some(value) => assert!((value / mean(place(column)) - 1.0).abs() < 1e-9, "{point}"),
+                None => assert_eq!(slipping().count(), 0, "{point}"),
+            }
+        }
+        let energy_to_j = rows[last - 1][place("energy_to_j")];
+        assert!((point["energy_to_j"].as_f64().unwrap() / energy_to_j - 1.0).abs() < 1e-6, "{point}");
+    }
     // the user's end
     let mut child = bench.wear(1_000_000).spawn().unwrap();
     let before = bench.done();
@@ -277,4 +314,33 @@ fn killed_or_over_a_limit_the_shaker_rests_and_the_count_goes_on() {
     assert!(more.status.success(), "{}", String::from_utf8_lossy(&more.stderr));
     bench.verify();
     assert!(bench.done() >= after + 200);
+}
+
+/// The page shows stiffness, friction and energy over the cycles, and they grow with the file.
+#[test]
+fn the_live_page_shows_how_the_contact_wears() {
+    let bench = Bench::new(2000);
+    let slide = |cycles| {
+        let out = bench.wear(cycles).stderr(Stdio::piped()).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    };
+    slide(1000);
+    let server = live::Served::of(&bench.file);
+    let mut browser = Browser::start();
+    for look in [Look::DESK, Look { dark: true, ..Look::HAND }] {
+        let mut page = browser.open_url(&server.url, look);
+        page.until("live.state.whole?.progress.wear_cycles > 0");
+        page.key("8");
+        let shows = |cycles: u64| {
+            format!(
+                "document.querySelector('figure[data-figure=wear].ready') !== null && live.alive.get('wear')?.length === 3 && live.alive.get('wear')[0].panel.x.range[1] === {cycles}"
+            )
+        };
+        page.until(&shows(bench.done()));
+        slide(bench.done() + 500);
+        page.until(&shows(bench.done()));
+        live::picture(&mut page, &format!("wear-{}", look.width));
+        assert!(page.eval("document.documentElement.scrollWidth").as_u64().unwrap() <= u64::from(look.width));
+        assert_eq!(page.errors(), Vec::<String>::new());
+    }
 }

@@ -101,10 +101,9 @@ pub fn each(
     Ok(())
 }
 
-/// Sums over the cycles of one decade: cycles 1 to 9, 10 to 99, 100 to 999 and so on. The number of
-/// a cycle counts from 1.
+/// Sums over consecutive cycles. The number of a cycle counts from 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Decade {
+pub struct CycleSums {
     /// Cycles, measured or not.
     pub cycles: u64,
     /// Number of the first and the last of them; 0 if there is none.
@@ -138,7 +137,38 @@ impl Mean {
     }
 }
 
-impl Decade {
+impl CycleSums {
+    /// Adds the cycle with this number, counted from 1; `None` for a cycle that was not measured.
+    /// `energy_j` is what it dissipated, `normal_load_n` its normal load, if known.
+    pub fn add(
+        &mut self,
+        number: u64,
+        reading: Option<&CycleReading>,
+        energy_j: f64,
+        normal_load_n: Option<f64>,
+    ) {
+        if self.cycles == 0 {
+            self.numbers[0] = number;
+        }
+        self.numbers[1] = number;
+        self.cycles += 1;
+        self.energy_j += energy_j;
+        let Some(reading) = reading else { return };
+        self.amplitude.add(Some(reading.amplitude_m));
+        if let Some(friction_n) = reading.friction_n {
+            if self.slipping == 0 {
+                // from here on k_T alone counts
+                self.stiffness = Mean::default();
+            }
+            self.slipping += 1;
+            self.friction.add(Some(friction_n));
+            self.coefficient.add(normal_load_n.filter(|n| *n > 0.0).map(|n| friction_n / n));
+            self.stiffness.add(reading.stiffness_n_per_m);
+        } else if self.slipping == 0 {
+            self.stiffness.add(reading.stiffness_n_per_m);
+        }
+    }
+
     /// Mean k_T of the cycles in gross slip, or, if none slips, mean tangent stiffness, N/m.
     pub fn stiffness_n_per_m(&self) -> Option<f64> {
         self.stiffness.get()
@@ -160,13 +190,12 @@ impl Decade {
     }
 }
 
-/// The decades of a run, summed cycle by cycle.
+/// The decades of a run, cycles 1 to 9, 10 to 99, 100 to 999 and so on, summed cycle by cycle.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Decades(Vec<Decade>);
+pub struct Decades(Vec<CycleSums>);
 
 impl Decades {
-    /// Adds the cycle with this number, counted from 1; `None` for a cycle that was not measured.
-    /// `energy_j` is what it dissipated, `normal_load_n` its normal load, if known.
+    /// Adds a cycle: see [`CycleSums::add`].
     pub fn add(
         &mut self,
         number: u64,
@@ -176,33 +205,13 @@ impl Decades {
     ) {
         let place = number.max(1).ilog10() as usize;
         if self.0.len() <= place {
-            self.0.resize(place + 1, Decade::default());
+            self.0.resize(place + 1, CycleSums::default());
         }
-        let decade = &mut self.0[place];
-        if decade.cycles == 0 {
-            decade.numbers[0] = number;
-        }
-        decade.numbers[1] = number;
-        decade.cycles += 1;
-        decade.energy_j += energy_j;
-        let Some(reading) = reading else { return };
-        decade.amplitude.add(Some(reading.amplitude_m));
-        if let Some(friction_n) = reading.friction_n {
-            if decade.slipping == 0 {
-                // from here on k_T alone counts
-                decade.stiffness = Mean::default();
-            }
-            decade.slipping += 1;
-            decade.friction.add(Some(friction_n));
-            decade.coefficient.add(normal_load_n.filter(|n| *n > 0.0).map(|n| friction_n / n));
-            decade.stiffness.add(reading.stiffness_n_per_m);
-        } else if decade.slipping == 0 {
-            decade.stiffness.add(reading.stiffness_n_per_m);
-        }
+        self.0[place].add(number, reading, energy_j, normal_load_n);
     }
 
     /// The decades with cycles, the first cycles first.
-    pub fn iter(&self) -> impl Iterator<Item = &Decade> {
+    pub fn iter(&self) -> impl Iterator<Item = &CycleSums> {
         self.0.iter().filter(|decade| decade.cycles > 0)
     }
 }
@@ -302,7 +311,7 @@ mod tests {
             let own = reading((number > 4).then_some(50.0));
             decades.add(number, (number != 500).then_some(&own), 1e-3, Some(100.0));
         }
-        let all: Vec<Decade> = decades.iter().copied().collect();
+        let all: Vec<CycleSums> = decades.iter().copied().collect();
         assert_eq!(all.iter().map(|d| d.cycles).collect::<Vec<_>>(), [9, 90, 900, 235]);
         assert_eq!(all.iter().map(|d| d.slipping).collect::<Vec<_>>(), [5, 90, 899, 235]);
         assert_eq!(all[3].numbers, [1_000, 1_234]);

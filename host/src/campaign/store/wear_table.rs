@@ -364,27 +364,36 @@ impl Store {
             return Ok(());
         }
         let mut read = || {
-            let sql = format!("SELECT {}, seal, cycles FROM wear_blocks ORDER BY id", WearBlockRow::list());
-            let mut statement = self.connection.prepare(&sql)?;
+            let mut statement = self.connection.prepare(&select_block("ORDER BY id"))?;
             let mut rows = statement.query([])?;
-            let bytes_at = WearBlockRow::columns().count() + 1;
             while let Some(row) = rows.next()? {
-                let id = row.get(0)?;
-                let damaged = |what: String| DamagedWear { table: TABLES[0].0, id, what };
-                let bytes = row.get_ref(bytes_at)?.as_blob().unwrap_or_default();
-                look(row_seal::read::<WearBlockRow>(row)?.map_err(damaged).and_then(|own| {
-                    let found = crc32fast::hash(bytes);
-                    let stored = own.bytes_crc;
-                    if found != stored {
-                        return Err(damaged(CodecError::Bytes { found, stored }.to_string()));
-                    }
-                    let cycles = unpack(bytes, own.count);
-                    cycles.map(|cycles| (own, cycles)).ok_or_else(|| damaged(CodecError::Shape.to_string()))
-                }));
+                look(block_of(row)?);
             }
             Ok(())
         };
         read().map_err(self.failed("reading wear cycles"))
+    }
+
+    /// The block that holds the cycle with this number (from 1), with its cycles; `None` if it is
+    /// not in the file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the block is damaged; the error names it.
+    pub fn wear_block_with(&self, cycle: u64) -> Result<Option<(WearBlockRow, Vec<WearCycle>)>, StoreError> {
+        if !self.has_wear()? {
+            return Ok(None);
+        }
+        let sql = select_block("WHERE cycles_before < ?1 ORDER BY cycles_before DESC LIMIT 1");
+        let failed = self.failed("reading wear cycles");
+        let find =
+            || self.connection.prepare_cached(&sql)?.query_row([cycle.cast_signed()], block_of).optional();
+        let found = find().map_err(failed)?.transpose();
+        let found = found.map_err(|damaged| self.damaged_block(&damaged))?;
+        Ok(found.filter(|(row, _)| cycle <= row.cycles_before + row.count))
+    }
+
+    fn damaged_block(&self, damaged: &DamagedWear) -> StoreError {
+        self.content(format!("{damaged}; `jointrig campaign verify` lists all damage"))
     }
 
     /// Calls `look` for every cycle, in order, with its block, its number from 1, and the energy
@@ -409,9 +418,7 @@ impl Store {
                 damaged.get_or_insert(error);
             }
         })?;
-        damaged.map_or(Ok(()), |error| {
-            Err(self.content(format!("{error}; `jointrig campaign verify` lists all damage")))
-        })
+        damaged.map_or(Ok(()), |damaged| Err(self.damaged_block(&damaged)))
     }
 
     /// Every raw loop without its samples, in order.
@@ -476,6 +483,29 @@ impl Store {
         }
         Ok(damage)
     }
+}
+
+/// Selects blocks, for [`block_of`].
+fn select_block(which: &str) -> String {
+    format!("SELECT {}, seal, cycles FROM wear_blocks {which}", WearBlockRow::list())
+}
+
+/// A block with its cycles, or what is damaged.
+fn block_of(
+    row: &rusqlite::Row<'_>,
+) -> rusqlite::Result<Result<(WearBlockRow, Vec<WearCycle>), DamagedWear>> {
+    let id = row.get(0)?;
+    let damaged = |what: String| DamagedWear { table: TABLES[0].0, id, what };
+    let bytes = row.get_ref(WearBlockRow::columns().count() + 1)?.as_blob().unwrap_or_default();
+    Ok(row_seal::read::<WearBlockRow>(row)?.map_err(damaged).and_then(|own| {
+        let found = crc32fast::hash(bytes);
+        let stored = own.bytes_crc;
+        if found != stored {
+            return Err(damaged(CodecError::Bytes { found, stored }.to_string()));
+        }
+        let cycles = unpack(bytes, own.count);
+        cycles.map(|cycles| (own, cycles)).ok_or_else(|| damaged(CodecError::Shape.to_string()))
+    }))
 }
 
 fn total(connection: &Connection) -> rusqlite::Result<WearTotal> {

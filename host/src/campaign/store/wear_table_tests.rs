@@ -105,6 +105,24 @@ fn cycles_come_back_as_they_were_stored() {
 }
 
 #[test]
+fn the_block_of_a_cycle_is_found() {
+    let (_folder, store, _) = file();
+    for (cycle, block) in [(1, Some(0)), (2, Some(0)), (3, Some(2)), (6, Some(2)), (7, None), (0, None)] {
+        let found = store.wear_block_with(cycle).expect("read").map(|(row, cycles)| {
+            assert_eq!(row.count, cycles.len() as u64);
+            row.cycles_before
+        });
+        assert_eq!(found, block, "cycle {cycle}");
+    }
+    store.connection.execute_batch("DROP TRIGGER wear_blocks_stay").expect("dropped");
+    let broken = "UPDATE wear_blocks SET cycles = zeroblob(length(cycles)) WHERE id = 2";
+    store.connection.execute(broken, []).expect("changed");
+    let error = store.wear_block_with(4).expect_err("damaged").to_string();
+    assert!(error.contains("block of wear cycles 2") && error.contains("verify"), "{error}");
+    assert!(store.wear_block_with(1).expect("read").is_some());
+}
+
+#[test]
 fn a_block_that_does_not_follow_is_refused_and_nothing_is_stored() {
     let (_folder, store, id) = file();
     let total = store.wear_total().expect("read");

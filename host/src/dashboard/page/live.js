@@ -54,7 +54,7 @@ function strip(){
   const link=w.now.link||p,disk=w.now.disk;
   $('link').textContent=[link.lost_scans&&`${link.lost_scans} scans lost`,link.recovered_scans&&`${link.recovered_scans} sent again`,disk&&`${room(disk.free_bytes)} free`,scope.missed&&`${scope.missed} frames missed`,held&&'picture held (space)'].filter(Boolean).join(', ');
   $('write').hidden=$('end').hidden=!mayEdit();
-  shakerScreen.button.hidden=!(w.levels.length||w.now.shaker);
+  shakerScreen.button.hidden=!(w.levels.length||w.now.shaker||w.progress.wear_cycles);
   for(const s of SCREENS)if(s!==shakerScreen)s.button.hidden=!w.file&&s!==scopeScreen;
   scopeScreen.button.textContent=w.can.stream?'Scope':'Channels';
 }

@@ -19,9 +19,11 @@ mod noise_floor;
 mod receptances;
 mod shaker_loops;
 mod specimens;
+mod wear;
 
 pub use cells::geometry;
 pub use receptances::frf_matrix;
+pub use wear::wear;
 
 use super::figure::{Figure, Panel, Source};
 use crate::results::Results;
@@ -106,6 +108,7 @@ pub const ALL: &[Entry] = &[
         "levels of the shaker at which the contact slips",
         backbone::backbone,
     ),
+    entry(Chapter::Loops, "The wear run along its cycles", "a run of `jointrig wear`", wear::of_results),
     entry(Chapter::Loops, "FRFs at the contact", IMPACTS, specimens::specimens),
     entry(
         Chapter::Loops,
