@@ -1,4 +1,5 @@
-//! Median of long records, used as an estimate that is robust against pulses and bursts.
+//! Median of long records, used as an estimate that is robust against pulses and bursts, and noise
+//! by it.
 
 use crate::vectors::wide;
 use pulp::NullaryFnOnce;
@@ -86,6 +87,19 @@ fn key(value: f64) -> i64 {
 /// The value of a key; the bit operation is its own inverse.
 fn value(key: i64) -> f64 {
     f64::from_bits((key ^ ((key >> 63).cast_unsigned() >> 1).cast_signed()).cast_unsigned())
+}
+
+/// Standard deviation of the independent noise of a closed signal, from the median of its third
+/// differences: smooth parts vanish in them, and few corners do not move a median.
+pub(crate) fn noise_of(signal: &[f64]) -> f64 {
+    let n = signal.len();
+    let third = |i: usize| {
+        let at = |by: usize| signal[(i + by) % n];
+        (at(3) - 3.0 * at(2) + 3.0 * at(1) - at(0)).abs()
+    };
+    let differences: Vec<f64> = (0..n).map(third).collect();
+    // the median of |N(0, 1)| is 0.6745, and the squares of 1, 3, 3, 1 add up to 20
+    middle(&differences).unwrap_or(f64::NAN) / (0.6745 * 20f64.sqrt())
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 use super::FrictionError;
 use super::law::ends;
 use crate::hysteresis::loops::swing;
-use crate::median;
+use crate::median::noise_of;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -290,19 +290,6 @@ fn basis(points: usize, harmonics: usize) -> DMatrix<f64> {
         let turn = TAU * ((column / 2 + 1) * i % points) as f64 / points as f64;
         if column % 2 == 0 { turn.cos() } else { turn.sin() }
     })
-}
-
-/// Standard deviation of the independent noise of a closed signal, from the median of its third
-/// differences: smooth parts vanish in them, and few corners do not move a median.
-fn noise_of(signal: &[f64]) -> f64 {
-    let n = signal.len();
-    let third = |i: usize| {
-        let at = |by: usize| signal[(i + by) % n];
-        (at(3) - 3.0 * at(2) + 3.0 * at(1) - at(0)).abs()
-    };
-    let differences: Vec<f64> = (0..n).map(third).collect();
-    // the median of |N(0, 1)| is 0.6745, and the squares of 1, 3, 3, 1 add up to 20
-    median::middle(&differences).unwrap_or(f64::NAN) / (0.6745 * 20f64.sqrt())
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ use super::steady::shaker;
 use super::{HysteresisError, Kind, LoopAnalysis, LoopFinding};
 
 /// A record without an excitation frequency counts as steady when the strength of its last quarter
-/// is at least this fraction of that of its first.
+/// is at least this fraction of that of its first. A decay after a hit is strongest at its
+/// beginning; an excitation that is faded in and out is strongest in the middle.
 const STEADY: f64 = 0.7;
 
 /// If the frequency early in a decay is below this fraction of the later one, slip is softening the
@@ -86,7 +87,8 @@ fn is_steady(force_n: &[f64]) -> bool {
         let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
         x.iter().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt()
     };
-    quarter > 0 && strength(&force_n[3 * quarter..4 * quarter]) > STEADY * strength(&force_n[..quarter])
+    let of = |which: usize| strength(&force_n[which * quarter..(which + 1) * quarter]);
+    quarter > 0 && (of(3) > STEADY * of(0) || of(1).max(of(2)) > of(0))
 }
 
 /// A resonance of one specimen that is visible in the record itself.

@@ -205,9 +205,19 @@ impl<'a> Steady<'a> {
         (to - from) / (self.len() * self.points) as f64
     }
 
-    /// The middle of the cycles used, s after the first sample.
-    pub fn middle_s(&self) -> f64 {
-        self.timing.begin_s(0.5 * (self.used.start + self.used.end) as f64)
+    /// Frequency in the middle of the cycles used, Hz.
+    pub fn middle_hz(&self) -> f64 {
+        self.timing.at(self.timing.begin_s(0.5 * (self.used.start + self.used.end) as f64))
+    }
+
+    /// The record.
+    pub fn record(&self) -> &'a HysteresisRecord {
+        self.record
+    }
+
+    /// Points of a cycle.
+    pub fn points(&self) -> usize {
+        self.points
     }
 
     /// Calls `look` for every cycle with this force, in order; `of` is the sum over all of them.

@@ -48,8 +48,14 @@ struct Loop {
     stated: f64,
     /// Play relative to the amplitude.
     play: f64,
-    /// Number of cycles over which the amplitude grows to its full size.
+    /// Number of cycles over which the amplitude grows to its full size, and over which it fades at
+    /// the end.
     grows: f64,
+    fades: f64,
+    /// Number of cycles at rest before and after that.
+    rests: f64,
+    /// Whether the frequency is stated.
+    states: bool,
 }
 
 impl Loop {
@@ -78,6 +84,9 @@ impl Loop {
             stated: 1.0,
             play: 0.0,
             grows: 0.0,
+            fades: 0.0,
+            rests: 0.0,
+            states: true,
         }
     }
 
@@ -106,14 +115,14 @@ impl Loop {
         // the law is integrated on a finer grid, starting one cycle earlier
         let fine = (2_000.0 / self.points).ceil() as usize;
         let w = TAU / self.points;
-        let size =
-            |at: f64| if self.grows > 0.0 { (at / self.points / self.grows).clamp(0.0, 1.0) } else { 1.0 };
-        let x = |at: f64| self.amplitude * size(at) * (w * at).sin();
-        let v = |at: f64| {
-            let growing = self.grows > 0.0 && size(at) < 1.0 && at > 0.0;
-            let more = if growing { (w * at).sin() / self.points / self.grows } else { 0.0 };
-            self.amplitude * (size(at) * w * (w * at).cos() + more) * fs_hz
+        let part = |cycles: f64, over: f64| if over > 0.0 { (cycles / over).clamp(0.0, 1.0) } else { 1.0 };
+        let size = |at: f64| {
+            let turn = at / self.points;
+            part(turn - self.rests, self.grows).min(part(self.cycles - self.rests - turn, self.fades))
         };
+        let x = |at: f64| self.amplitude * size(at) * (w * at).sin();
+        // second order of a step of 1e-3 samples
+        let v = |at: f64| (x(at + 1e-3) - x(at - 1e-3)) / 2e-3 * fs_hz;
         let count = if self.law == Law::Sliders { 20 } else { 1 };
         let own = self.stiffness / f64::from(count);
         let mut sliders = vec![0.0; count as usize];
@@ -176,7 +185,7 @@ impl Loop {
             fs_hz,
             motion,
             force_n,
-            excitation_hz: Some(self.stated * self.frequency_hz),
+            excitation_hz: self.states.then_some(self.stated * self.frequency_hz),
             normal_load_n: None,
         }
     }
@@ -245,7 +254,7 @@ fn frequency_is_off(l: &Loop, found: &LoopAnalysis) -> bool {
     said && near(found.frequency_hz, l.frequency_hz, 0.005)
 }
 
-const FAULTS: [Fault; 5] = [
+const FAULTS: [Fault; 6] = [
     (
         "force late or early by 1 to 15 % of the cycle",
         |rng| Loop { late: signed(rng, 0.01, 0.15), ..Loop::slider(rng) },
@@ -304,6 +313,26 @@ const FAULTS: [Fault; 5] = [
                 _ => false,
             };
             found.findings.iter().any(said) && slider_is_right(l, found, 0.04, 0.02)
+        },
+    ),
+    (
+        "from rest to rest: one to two cycles grow, three to eight are steady, one to two fade",
+        |rng| {
+            let (grows, fades) = (between(rng, 1.0, 2.0), between(rng, 1.0, 2.0));
+            let rests = rng.random::<f64>();
+            let steady = between(rng, 3.0, 8.0);
+            let cycles = 2.0 * rests + grows + steady + fades;
+            let states = rng.random::<bool>();
+            Loop { cycles, grows, fades, rests, states, ..Loop::slider(rng) }
+        },
+        |l, found| {
+            let said = |f: &LoopFinding| match f {
+                LoopFinding::Unsteady { left_out_first, left_out_last, .. } => {
+                    *left_out_first > 0 && *left_out_last > 0
+                }
+                _ => false,
+            };
+            found.findings.iter().any(said) && slider_is_right(l, found, 0.05, 0.03)
         },
     ),
 ];

@@ -12,7 +12,7 @@ use super::loops::{
     Cycle, OverCycles, closed_swing, energy, equivalent_stiffness, fundamental_stiffness, secant_stiffness,
     swing,
 };
-use super::record::{HysteresisRecord, RelativeMotion};
+use super::record::{HysteresisRecord, Relative, RelativeMotion};
 use super::repair::{Delay, Repair, delay};
 use super::shape::{Quadratures, Shape, ShapeEvidence, shape};
 use super::stick::{
@@ -20,7 +20,7 @@ use super::stick::{
     strokes, tangent_at_reversal,
 };
 use super::{Kind, LoopAnalysis, LoopFinding};
-use crate::median::middle;
+use crate::median::{middle, noise_of};
 use crate::parallel::join;
 use crate::parallel::prelude::*;
 use crate::spectra::fft::forward;
@@ -52,7 +52,8 @@ const ALIKE_RATIO: f64 = 0.1;
 /// or by this many times the scatter of neighbouring cycles, if that is more.
 const SCATTERS: f64 = 12.0;
 
-/// Cycles whose mean square tells their scatter: with ten second differences, to a third.
+/// Cycles whose mean square tells their scatter: with ten second differences, to a third. Of fewer
+/// cycles, those that grow and fade would be taken for scatter.
 const TELLING: usize = 12;
 
 /// Start times of a record's cycles, and the finding on their frequency.
@@ -93,24 +94,27 @@ fn amplitude(cycle: &Harmonics) -> f64 {
 
 /// The longest run of cycles that are alike in amplitude and in T₁/Δx₁. Cycles at the beginning or
 /// the end may differ if the excitation grows or decays, or if the contact is loaded for the first
-/// time.
-fn alike(cycles: &[Harmonics]) -> Range<usize> {
+/// time. `noise` is the standard deviation of amplitude and T₁/Δx₁ by the noise of the signals, as
+/// fractions.
+fn alike(cycles: &[Harmonics], noise: [f64; 2]) -> Range<usize> {
     let ratio = |h: &Harmonics| h.force[0] / h.displacement[0];
     let scaled = |of: &dyn Fn(&Harmonics) -> f64, by: f64| -> Vec<f64> {
         cycles.iter().map(|cycle| of(cycle) / by).collect()
     };
     let size = |of: &dyn Fn(&Harmonics) -> f64| middle(&scaled(of, 1.0)).unwrap_or(f64::NAN);
     let (a, r) = (size(&amplitude), size(&|h| ratio(h).norm()));
-    alike_in(&[scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)])
+    alike_in(&[scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)], noise)
 }
 
 /// As [`alike`], for the amplitudes and both parts of T₁/Δx₁, relative to their medians.
-fn alike_in(series: &[Vec<f64>; 3]) -> Range<usize> {
+fn alike_in(series: &[Vec<f64>; 3], noise: [f64; 2]) -> Range<usize> {
     let limits = |scatters: [f64; 3]| -> [f64; 3] {
         let least = [ALIKE, ALIKE_RATIO, ALIKE_RATIO];
         std::array::from_fn(|of| least[of].max(SCATTERS * scatters[of]))
     };
-    let first = limits(series.each_ref().map(|values| scatter(values)));
+    let [of_amplitude, of_ratio] = noise;
+    let of_noise = [of_amplitude, of_ratio, of_ratio];
+    let first = limits(std::array::from_fn(|of| scatter(&series[of], of_noise[of])));
     let used = longest_inside(series, first);
     if used.len() == series[0].len() {
         return used;
@@ -155,12 +159,16 @@ fn second_differences(values: &[f64]) -> impl Iterator<Item = f64> {
 }
 
 /// Standard deviation of the scatter between neighbouring values, from the lower quartile of their
-/// second differences: a growing beginning has few small ones. Zero for three values or fewer.
-fn scatter(values: &[f64]) -> f64 {
+/// second differences: a growing beginning has few small ones. Of a few values most may grow and
+/// fade, so that only the smallest difference counts, or the noise of the signals, if that is more.
+fn scatter(values: &[f64], noise: f64) -> f64 {
     let mut changes: Vec<f64> = second_differences(values).collect();
     changes.sort_by(f64::total_cmp);
+    if values.len() < TELLING {
+        return if changes.len() < 2 { noise } else { noise.max(changes[0]) };
+    }
     // a quarter of normally distributed values lies within 0.3186 standard deviations
-    if changes.len() < 2 { 0.0 } else { changes[(changes.len() - 1) / 4] / 0.3186 }
+    changes[(changes.len() - 1) / 4] / 0.3186
 }
 
 /// As [`scatter`], from the mean square: for values without a growing beginning. Zero for fewer
@@ -173,17 +181,34 @@ fn scatter_of_alike(values: &[f64]) -> f64 {
     (squares / (values.len() - 2) as f64).sqrt()
 }
 
+/// Standard deviation of a cycle's amplitude and T₁/Δx₁ by the independent noise of the samples, as
+/// fractions of them.
+fn noise_of_a_cycle(record: &HysteresisRecord, points: usize) -> [f64; 2] {
+    let part = |signal: &[f64]| {
+        let mean = signal.iter().sum::<f64>() / signal.len() as f64;
+        let square = signal.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / signal.len() as f64;
+        // the amplitude is √2 of the standard deviation, and its noise √(2/n) of that of a sample
+        noise_of(signal) / (square * points as f64).sqrt()
+    };
+    let (Relative::Velocity(motion) | Relative::Displacement(motion)) = record.relative();
+    let (motion, force) = (part(&motion), part(&record.force_n));
+    [motion, motion.hypot(force)]
+}
+
 /// The cycles that are alike, and the finding on the others.
 fn steady_part<'a>(
-    cycles: Steady<'a>,
+    cycles: &Steady<'a>,
     summed: &Summed,
 ) -> Result<(Steady<'a>, Option<LoopFinding>), HysteresisError> {
     let measured = if summed.as_measured.is_empty() { &summed.harmonics } else { &summed.as_measured };
-    let (with_drift, without) = (alike(measured), alike(&summed.harmonics));
+    // more cycles show their scatter themselves
+    let noise =
+        if measured.len() < TELLING { noise_of_a_cycle(cycles.record(), cycles.points()) } else { [0.0; 2] };
+    let (with_drift, without) = (alike(measured, noise), alike(&summed.harmonics, noise));
     let (used, each) =
         if without.len() > with_drift.len() { (without, &summed.harmonics) } else { (with_drift, measured) };
     if used.len() == each.len() {
-        return Ok((cycles, None));
+        return Ok((cycles.only(used), None));
     }
     if used.len() < 2 {
         let (low_m, high_m) = each
@@ -205,6 +230,35 @@ fn steady_part<'a>(
         left_out_amplitude_m,
     };
     Ok((cycles.only(used), Some(said)))
+}
+
+/// How often the frequency of the steady cycles is found again from their phase. The first time
+/// cycles may still reach into others that grow.
+const TIMES: usize = 3;
+
+/// The steady part of the record at the constant frequency of these cycles; none if fewer cycles
+/// are alike then, because the frequency drifts.
+fn timed_again<'a, const N: usize>(
+    cycles: &Steady<'a>,
+    summed: &Summed,
+    forces: [CycleForce<'_>; N],
+) -> Option<(Steady<'a>, Option<LoopFinding>)> {
+    let mut steady_hz = cycles.middle_hz() * (1.0 + turned_per_cycle(&summed.harmonics)?);
+    let mut found = None;
+    for _ in 0..TIMES {
+        let again = Steady::new(cycles.record(), Timing::steady(steady_hz)).ok()?;
+        let (own, left_out) = steady_part(&again, again.summed(forces).first()?).ok()?;
+        steady_hz *= 1.0 + turned_per_cycle(&own.summed(forces).first()?.harmonics)?;
+        found = Some((own, left_out));
+    }
+    found.filter(|(own, _)| own.len() >= cycles.len())
+}
+
+/// By what part of a turn the motion's phase advances from cycle to cycle: by how much its
+/// frequency is above that of the cycles. None for a single cycle.
+fn turned_per_cycle(cycles: &[Harmonics]) -> Option<f64> {
+    let steps = cycles.windows(2).map(|two| two[1].displacement[0] * two[0].displacement[0].conj());
+    (cycles.len() > 1).then(|| steps.sum::<Complex<f64>>().arg() / TAU)
 }
 
 /// Delay of the force relative to the motion in loops without a plateau: a lower bound.
@@ -231,23 +285,28 @@ pub(super) fn shaker<const N: usize>(
     forces: [CycleForce<'_>; N],
     frequency_hz: f64,
 ) -> Result<[LoopAnalysis; N], HysteresisError> {
-    let (timing, off) = timing(record, frequency_hz)?;
-    let mut cycles = Steady::new(record, timing)?;
-    let frequency_hz = timing.at(0.5 * record.force_n.len() as f64 / record.fs_hz);
+    let (timing, mut off) = timing(record, frequency_hz)?;
+    let cycles = Steady::new(record, timing)?;
+    let mut frequency_hz = timing.at(0.5 * record.force_n.len() as f64 / record.fs_hz);
     let (hum, mut summed) = join(|| hum_at_the_loop(record, frequency_hz), || cycles.summed(forces));
     let still = |all: &Summed| swing(&all.mean.displacement_m) == 0.0 || swing(&all.mean.force_n) == 0.0;
     if summed.iter().any(still) {
         return Err(HysteresisError::NoMotion);
     }
-    let mut unsteady = None;
     // all forces share the cycles of the first
-    if let Some(first) = summed.first() {
-        (cycles, unsteady) = steady_part(cycles, first)?;
-    }
+    let Some(first) = summed.first() else { return Err(HysteresisError::NoMotion) };
+    let (mut cycles, mut unsteady) = steady_part(&cycles, first)?;
     if unsteady.is_some() {
         summed = cycles.summed(forces);
+        // the frequency of the whole record contains the phase of cycles that grow, fade or rest
+        if record.excitation_hz.is_none()
+            && let Some((again, left_out)) = timed_again(&cycles, &summed[0], forces)
+        {
+            (cycles, unsteady, off) = (again, left_out, None);
+            summed = cycles.summed(forces);
+        }
+        frequency_hz = cycles.middle_hz();
     }
-    let frequency_hz = if unsteady.is_some() { timing.at(cycles.middle_s()) } else { frequency_hz };
     let said = [off, unsteady, hum].into_iter().flatten().collect();
     let steady = SteadyRecord { record, cycles, frequency_hz, said };
     let mut forces = forces.into_iter();
@@ -605,10 +664,10 @@ mod tests {
                 (0..60).map(|_| 1.0 + std * Distribution::<f64>::sample(&StandardNormal, &mut rng)).collect()
             };
             let noise = [values(0.01), values(0.03), values(0.03)];
-            assert_eq!(alike_in(&noise), 0..60, "seed {seed}");
+            assert_eq!(alike_in(&noise, [0.0; 2]), 0..60, "seed {seed}");
             let [mut amplitudes, re, im] = noise;
             amplitudes.iter_mut().enumerate().for_each(|(n, a)| *a -= 0.4 * (-(n as f64) / 3.0).exp());
-            let used = alike_in(&[amplitudes, re, im]);
+            let used = alike_in(&[amplitudes, re, im], [0.0; 2]);
             // 12 scatters allow a range of 12 %, of which the noise takes about 5
             assert!(used.start >= 1 && used.len() >= 45, "seed {seed}: {used:?}");
         }
