@@ -13,6 +13,7 @@ use crate::friction::{
     FrictionCoefficients, JudgedLaw, LawChoice, LawKind, LawRefusal, LoopEnds, MeasuredLoop, choose,
 };
 use crate::hysteresis::{Correction, HysteresisRecord, analyse};
+use crate::report::words::number::prefixed;
 use crate::untrusted_text::tell_line;
 use clap::Args;
 use serde::Serialize;
@@ -309,10 +310,10 @@ fn lines(document: &LawDocument<'_>) -> Vec<String> {
             format!(", μ by peak {:.3}, by energy {:.3}, by plateau {:.3}", c.peak, c.energy, c.plateau)
         });
         lines.push(format!(
-            "loop {}: ± {:.3} µm, {:.4} mJ per cycle, {}{coefficients}",
+            "loop {}: ± {}, {} per cycle, {}{coefficients}",
             one.name,
-            1e6 * one.amplitude_m,
-            1e3 * one.energy_j,
+            prefixed(one.amplitude_m, "m"),
+            prefixed(one.energy_j, "J"),
             ends_in_words(one.ends),
         ));
     }
@@ -357,7 +358,7 @@ fn refusal_in_words(refusal: &LawRefusal) -> String {
             "its residuals exceed the noise by {excess:.1} standard deviations, their smooth part by {smooth_excess:.1}"
         ),
         LawRefusal::Energy { amplitude_m, change } => {
-            format!("its energy is {:+.1} % off at ± {:.3} µm", 100.0 * change, 1e6 * amplitude_m)
+            format!("its energy is {:+.1} % off at ± {}", 100.0 * change, prefixed(*amplitude_m, "m"))
         }
         LawRefusal::NotDetermined => "the loops do not determine all of its parameters".into(),
         LawRefusal::Evidence { behind } => {
