@@ -100,9 +100,9 @@ pub enum HysteresisError {
         /// The strongest frequency of the relative motion, Hz.
         motion_hz: f64,
     },
-    /// No two consecutive cycles are alike.
+    /// No two consecutive cycles are alike, or only some with a small part of the motion.
     #[error(
-        "none of the {cycles} cycles has the amplitude of its neighbour ({low_m:.3e} to {high_m:.3e} m): no steady loop is in this record; record longer, or after the excitation has settled"
+        "the main part of its motion is not steady: {cycles} cycles with amplitudes of {low_m:.3e} to {high_m:.3e} m; record longer, after the excitation has settled, and one level in a file"
     )]
     NotSteady {
         /// Cycles of the record.
@@ -111,6 +111,16 @@ pub enum HysteresisError {
         low_m: f64,
         /// Largest, m.
         high_m: f64,
+    },
+    /// The cycles at the frequency that was found are not in phase.
+    #[error(
+        "its {cycles} cycles at {frequency_hz:.4} Hz are not in phase with one another: no steady excitation of this frequency is in this record; state the frequency, or record a steady one"
+    )]
+    NoSteadyPhase {
+        /// Cycles that are alike in amplitude.
+        cycles: usize,
+        /// The strongest frequency of the force, Hz.
+        frequency_hz: f64,
     },
     /// Nothing moves.
     #[error("force or relative motion is constant: there is no loop; check the channels")]

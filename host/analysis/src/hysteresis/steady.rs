@@ -52,6 +52,19 @@ const ALIKE_RATIO: f64 = 0.1;
 /// or by this many times the scatter of neighbouring cycles, if that is more.
 const SCATTERS: f64 = 12.0;
 
+/// A cycle is at rest below this fraction of the largest amplitude.
+const AT_REST: f64 = 0.05;
+
+/// The cycles of a frequency that was not stated are those of an excitation if their average has
+/// this fraction of their amplitude.
+const IN_PHASE: f64 = 0.95;
+
+/// If others have this many times their amplitude, steady cycles are the record's main part only
+const LARGER: f64 = 2.0;
+
+/// if they have this fraction of the sum of squares of all amplitudes.
+const MAIN: f64 = 0.5;
+
 /// Cycles whose mean square tells their scatter: with ten second differences, to a third. Of fewer
 /// cycles, those that grow and fade would be taken for scatter.
 const TELLING: usize = 12;
@@ -94,16 +107,35 @@ fn amplitude(cycle: &Harmonics) -> f64 {
 
 /// The longest run of cycles that are alike in amplitude and in T₁/Δx₁. Cycles at the beginning or
 /// the end may differ if the excitation grows or decays, or if the contact is loaded for the first
-/// time. `noise` is the standard deviation of amplitude and T₁/Δx₁ by the noise of the signals, as
-/// fractions.
-fn alike(cycles: &[Harmonics], noise: [f64; 2]) -> Range<usize> {
+/// time; those at rest before and after do not count. `noise` is the standard deviation of
+/// amplitude and T₁/Δx₁ by the noise of the signals, as fractions.
+fn alike(cycles: &[Harmonics], noise: impl Fn() -> [f64; 2]) -> Range<usize> {
+    let moving = moving(cycles);
+    let first = moving.start;
+    let cycles = &cycles[moving];
+    // more cycles show their scatter themselves
+    let noise = if cycles.len() < TELLING { noise() } else { [0.0; 2] };
     let ratio = |h: &Harmonics| h.force[0] / h.displacement[0];
     let scaled = |of: &dyn Fn(&Harmonics) -> f64, by: f64| -> Vec<f64> {
         cycles.iter().map(|cycle| of(cycle) / by).collect()
     };
     let size = |of: &dyn Fn(&Harmonics) -> f64| middle(&scaled(of, 1.0)).unwrap_or(f64::NAN);
     let (a, r) = (size(&amplitude), size(&|h| ratio(h).norm()));
-    alike_in(&[scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)], noise)
+    let series = [scaled(&amplitude, a), scaled(&|h| ratio(h).re, r), scaled(&|h| ratio(h).im, r)];
+    let found = alike_in(&series, noise);
+    first + found.start..first + found.end
+}
+
+/// From the first cycle that moves to the last one. The largest amplitude is one that two
+/// neighbours have, so that a single disturbance does not make the others rest.
+fn moving(cycles: &[Harmonics]) -> Range<usize> {
+    let amplitudes: Vec<f64> = cycles.iter().map(amplitude).collect();
+    let largest = amplitudes.windows(2).map(|two| two[0].min(two[1])).fold(0.0, f64::max);
+    let moves = |own: &f64| *own >= AT_REST * largest;
+    match (amplitudes.iter().position(moves), amplitudes.iter().rposition(moves)) {
+        (Some(first), Some(last)) => first..last + 1,
+        _ => 0..cycles.len(),
+    }
 }
 
 /// As [`alike`], for the amplitudes and both parts of T₁/Δx₁, relative to their medians.
@@ -201,23 +233,23 @@ fn steady_part<'a>(
     summed: &Summed,
 ) -> Result<(Steady<'a>, Option<LoopFinding>), HysteresisError> {
     let measured = if summed.as_measured.is_empty() { &summed.harmonics } else { &summed.as_measured };
-    // more cycles show their scatter themselves
-    let noise =
-        if measured.len() < TELLING { noise_of_a_cycle(cycles.record(), cycles.points()) } else { [0.0; 2] };
+    let noise = || noise_of_a_cycle(cycles.record(), cycles.points());
     let (with_drift, without) = (alike(measured, noise), alike(&summed.harmonics, noise));
     let (used, each) =
         if without.len() > with_drift.len() { (without, &summed.harmonics) } else { (with_drift, measured) };
     if used.len() == each.len() {
         return Ok((cycles.only(used), None));
     }
-    if used.len() < 2 {
-        let (low_m, high_m) = each
-            .iter()
-            .map(amplitude)
-            .fold((f64::INFINITY, 0.0f64), |(low, high), own| (low.min(own), high.max(own)));
+    let amplitude_m = each[used.clone()].iter().map(amplitude).sum::<f64>() / used.len() as f64;
+    let squares = |cycles: &[Harmonics]| cycles.iter().map(|cycle| amplitude(cycle).powi(2)).sum::<f64>();
+    let (low_m, high_m) = each
+        .iter()
+        .map(amplitude)
+        .fold((f64::INFINITY, 0.0f64), |(low, high), own| (low.min(own), high.max(own)));
+    let minor = high_m > LARGER * amplitude_m && squares(&each[used.clone()]) < MAIN * squares(each);
+    if used.len() < 2 || minor {
         return Err(HysteresisError::NotSteady { cycles: each.len(), low_m, high_m });
     }
-    let amplitude_m = each[used.clone()].iter().map(amplitude).sum::<f64>() / used.len() as f64;
     let others = each[..used.start].iter().chain(&each[used.end..]).map(amplitude);
     let left_out_amplitude_m = others
         .max_by(|a, b| (a - amplitude_m).abs().total_cmp(&(b - amplitude_m).abs()))
@@ -259,6 +291,13 @@ fn timed_again<'a, const N: usize>(
 fn turned_per_cycle(cycles: &[Harmonics]) -> Option<f64> {
     let steps = cycles.windows(2).map(|two| two[1].displacement[0] * two[0].displacement[0].conj());
     (cycles.len() > 1).then(|| steps.sum::<Complex<f64>>().arg() / TAU)
+}
+
+/// Amplitude of the average cycle over the root mean square of those of the cycles: 1 if all have
+/// the same phase.
+fn in_phase(summed: &Summed) -> f64 {
+    let each = summed.harmonics.iter().map(|cycle| amplitude(cycle).powi(2)).sum::<f64>();
+    amplitude(&summed.of_mean) / (each / summed.harmonics.len() as f64).sqrt()
 }
 
 /// Delay of the force relative to the motion in loops without a plateau: a lower bound.
@@ -306,6 +345,9 @@ pub(super) fn shaker<const N: usize>(
             summed = cycles.summed(forces);
         }
         frequency_hz = cycles.middle_hz();
+    }
+    if record.excitation_hz.is_none() && in_phase(&summed[0]) < IN_PHASE {
+        return Err(HysteresisError::NoSteadyPhase { cycles: cycles.len(), frequency_hz });
     }
     let said = [off, unsteady, hum].into_iter().flatten().collect();
     let steady = SteadyRecord { record, cycles, frequency_hz, said };
