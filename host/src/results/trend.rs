@@ -50,7 +50,7 @@ impl Serialize for StudiedQuantity {
 pub enum FittedForm {
     /// A line.
     Line,
-    /// A line over the covariate's logarithm.
+    /// A line of the quantity's logarithm over that of the covariate.
     PowerLaw,
     /// A natural cubic spline.
     Curve,

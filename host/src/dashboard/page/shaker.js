@@ -1,4 +1,5 @@
-// The shaker: the running level, the limits that stop it, the wear runs' curves, and the stored levels.
+// The shaker: the running level, the limits that stop it, the curves of wear runs, and the stored
+// levels.
 const amountOf=(held,v)=>v===null||v===undefined?'–':held==='displacement'?(v*1e6).toPrecision(4)+' µm':held==='force'?v.toPrecision(4)+' N':v.toPrecision(4)+' V';
 const shakerScreen={key:'shaker',title:'Shaker',make(m){
   this.head=m.appendChild(el('p',{className:'next',id:'level'}));

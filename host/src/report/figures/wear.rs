@@ -1,4 +1,4 @@
-//! A wear run along its cycles: stiffness, friction, and energy per cycle.
+//! A wear run along its cycles: stiffness, friction, and the energy dissipated so far.
 
 use super::MICRO;
 use crate::report::figure::{Along, Axis, Figure, Mark, Panel, Role};
@@ -58,7 +58,7 @@ pub fn wear(curve: &[WearMeans]) -> Option<Figure> {
 /// Name, field of the curve's points, factor, and the value times the factor.
 type Curve = (&'static str, &'static str, f64, fn(&WearMeans) -> Option<f64>);
 
-/// The panel with these curves, its vertical axis from zero or around them; none without values.
+/// The panel with these curves, its vertical axis from zero; none without values.
 fn panel<const N: usize>(mut panel: Panel, all: &[WearMeans], curves: [Curve; N]) -> Option<Panel> {
     let mut highest = 0.0_f64;
     for (i, (name, field, factor, of)) in curves.into_iter().enumerate() {
