@@ -276,6 +276,15 @@ impl Outlook {
         self.forecast.half_width_with_hits(GROWTH, |cell| of.is_none_or(|of| cell.structure == of))
     }
 
+    /// Whether ever more hits in the cells of one structure, or in all, could make the half width
+    /// this small: if the part of the variance that falls with the hits falls as their number.
+    pub fn within_reach(&self, until: f64, of: Option<Structure>) -> bool {
+        let (now, grown, growth) = (self.half_width().powi(2), self.grown(of).powi(2), GROWTH as f64);
+        // now = rest + noise, grown = rest + noise / growth
+        let rest = (growth * grown - now) / (growth - 1.0);
+        until.powi(2) > rest
+    }
+
     /// A visit to the cell with this index from `from`.
     fn visit(&self, forecast: &Forecast, cell: usize, from: Option<&CellName>) -> Visit {
         let (name, more) = (&self.cells[cell].name, self.more(forecast, cell, from));

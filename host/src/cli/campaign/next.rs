@@ -221,7 +221,8 @@ impl ChooseFurther for Until {
         let elsewhere = |cell: &CellName| found.mounted().is_some_and(|own| own != cell.configuration);
         let route =
             found.route(self.half_width, self.left, &|cell| elsewhere(cell) || excluded(&further(cell, 0)));
-        if route.is_empty() || found.grown(found.mounted()) > self.half_width || self.left == 0 {
+        // what is beyond the predicted hits is predicted again with those on the way there
+        if route.is_empty() || !found.within_reach(self.half_width, found.mounted()) || self.left == 0 {
             let why = say::route(&found, self.half_width, self.left, &route);
             return Ok(Choice::Enough { reached: false, why });
         }

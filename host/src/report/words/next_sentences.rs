@@ -76,7 +76,12 @@ pub fn route(found: &Outlook, until: f64, most_hits: usize, visits: &[Visit]) ->
         );
     }
     if found.grown(None) > until {
-        return format!("{} is out of reach of further hits: {}", half(until), limited(found));
+        let why = if found.within_reach(until, found.mounted()) {
+            format!("needs more than {GROWTH} times the hits, which is not predicted")
+        } else {
+            "is out of reach of further hits".into()
+        };
+        return format!("{} {why}: {}", half(until), limited(found));
     }
     format!(
         "{} is not reached with the next {hits} hits (of {most_hits}), which give {}: {}",
