@@ -21,7 +21,7 @@ pub fn wear(store: &Store) -> Result<Option<WearRuns>, StoreError> {
     let (mut decades, mut unmeasured) = (Decades::default(), 0);
     store.each_wear_cycle(|_, number, cycle, _| {
         unmeasured += u64::from(cycle.reading.is_none());
-        decades.add(number, cycle.reading.as_ref(), cycle.energy_j, cycle.normal_load_n);
+        decades.of(number).add(number, cycle.reading.as_ref(), cycle.energy_j, cycle.normal_load_n);
     })?;
     let mut energy_to_j = 0.0;
     let one = |decade: &CycleSums| {

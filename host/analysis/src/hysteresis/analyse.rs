@@ -11,11 +11,16 @@ use super::shape::Shape;
 use super::static_arm::{Correction, rate};
 use super::steady::shaker;
 use super::{HysteresisError, Kind, LoopAnalysis, LoopFinding};
+use crate::median::middle;
 
 /// A record without an excitation frequency counts as steady when the strength of its last quarter
 /// is at least this fraction of that of its first. A decay after a hit is strongest at its
 /// beginning; an excitation that is faded in and out is strongest in the middle.
 const STEADY: f64 = 0.7;
+
+/// The record moves from where the force first exceeds this fraction of its maximum to where it
+/// last does. Before a hit, and around an excitation, it is at rest.
+const MOVES: f64 = 0.1;
 
 /// If the frequency early in a decay is below this fraction of the later one, slip is softening the
 /// joint: partial slip, gross slip.
@@ -81,7 +86,19 @@ fn excitation(record: &HysteresisRecord) -> Result<Option<f64>, HysteresisError>
     }
 }
 
+/// The part of the record that moves.
+fn moving(force_n: &[f64]) -> &[f64] {
+    let rest = middle(force_n).unwrap_or_default();
+    let most = force_n.iter().map(|v| (v - rest).abs()).fold(0.0, f64::max);
+    let moves = |v: &f64| (v - rest).abs() >= MOVES * most;
+    match (force_n.iter().position(moves), force_n.iter().rposition(moves)) {
+        (Some(first), Some(last)) => &force_n[first..=last],
+        _ => force_n,
+    }
+}
+
 fn is_steady(force_n: &[f64]) -> bool {
+    let force_n = moving(force_n);
     let quarter = force_n.len() / 4;
     let strength = |x: &[f64]| {
         let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;

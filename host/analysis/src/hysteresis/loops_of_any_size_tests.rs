@@ -459,7 +459,7 @@ fn a_record_that_grows_all_along_is_refused() {
 /// Cyclic loading whose amplitude grows by steps of three cycles, as for building parts: the first
 /// step is as steady as any, but not what the record is about.
 #[test]
-fn a_record_of_growing_steps_is_refused() {
+fn of_growing_steps_the_last_is_taken_or_none() {
     let points = 400;
     let x: Vec<f64> = (0..24 * points)
         .map(|i| {
@@ -480,6 +480,29 @@ fn a_record_of_growing_steps_is_refused() {
             Err(HysteresisError::NotSteady { .. }) => {}
             Ok(found) => assert!(near(found.amplitude_m, largest, 0.01), "{found:?}"),
             Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+/// The decay after a hit stays one with any time before the hit, and an excitation that fades in
+/// and out is none.
+#[test]
+fn time_before_a_hit_does_not_make_its_decay_steady() {
+    let points = 200.0;
+    for before in [0.0, 3.0, 8.0, 15.0, 22.0, 30.0] {
+        for over in [4.0, 12.0, 25.0] {
+            // 60 cycles in all; the amplitude falls by a factor of e over `over` of them
+            let x: Vec<f64> = (0..12_000)
+                .map(|i| f64::from(i) / points - before)
+                .map(|turn| if turn < 0.0 { 0.0 } else { 1e-6 * (-turn / over).exp() * (TAU * turn).sin() })
+                .collect();
+            let force_n = x.iter().map(|x| 1e8 * x).collect();
+            let motion = RelativeMotion::Displacement { b_m: vec![0.0; x.len()], a_m: x };
+            let fs_hz = 100.0 * points;
+            let record =
+                HysteresisRecord { fs_hz, motion, force_n, excitation_hz: None, normal_load_n: None };
+            let found = analyse(&record).expect("a decay");
+            assert_eq!(found.kind, Kind::Impact, "{before} cycles before, falling over {over}");
         }
     }
 }

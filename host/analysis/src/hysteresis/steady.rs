@@ -213,13 +213,13 @@ fn scatter_of_alike(values: &[f64]) -> f64 {
     (squares / (values.len() - 2) as f64).sqrt()
 }
 
-/// Standard deviation of a cycle's amplitude and T₁/Δx₁ by the independent noise of the samples, as
-/// fractions of them.
+/// Standard deviation of a cycle's amplitude and T₁/Δx₁ by the independent noise of the samples,
+/// as fractions of them.
 fn noise_of_a_cycle(record: &HysteresisRecord, points: usize) -> [f64; 2] {
     let part = |signal: &[f64]| {
         let mean = signal.iter().sum::<f64>() / signal.len() as f64;
         let square = signal.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / signal.len() as f64;
-        // the amplitude is √2 of the standard deviation, and its noise √(2/n) of that of a sample
+        // the amplitude is √2 of the standard deviation, its noise √(2/n) of that of a sample
         noise_of(signal) / (square * points as f64).sqrt()
     };
     let (Relative::Velocity(motion) | Relative::Displacement(motion)) = record.relative();

@@ -195,19 +195,13 @@ impl CycleSums {
 pub struct Decades(Vec<CycleSums>);
 
 impl Decades {
-    /// Adds a cycle: see [`CycleSums::add`].
-    pub fn add(
-        &mut self,
-        number: u64,
-        reading: Option<&CycleReading>,
-        energy_j: f64,
-        normal_load_n: Option<f64>,
-    ) {
+    /// The decade of the cycle with this number, counted from 1.
+    pub fn of(&mut self, number: u64) -> &mut CycleSums {
         let place = number.max(1).ilog10() as usize;
         if self.0.len() <= place {
             self.0.resize(place + 1, CycleSums::default());
         }
-        self.0[place].add(number, reading, energy_j, normal_load_n);
+        &mut self.0[place]
     }
 
     /// The decades with cycles, the first cycles first.
@@ -309,7 +303,7 @@ mod tests {
         for number in 1..=1_234 {
             // cycles 1 to 4 stick, 500 is missing
             let own = reading((number > 4).then_some(50.0));
-            decades.add(number, (number != 500).then_some(&own), 1e-3, Some(100.0));
+            decades.of(number).add(number, (number != 500).then_some(&own), 1e-3, Some(100.0));
         }
         let all: Vec<CycleSums> = decades.iter().copied().collect();
         assert_eq!(all.iter().map(|d| d.cycles).collect::<Vec<_>>(), [9, 90, 900, 235]);
