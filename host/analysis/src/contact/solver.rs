@@ -10,7 +10,7 @@
 use super::ContactError;
 use super::block::{Block, BlockCell, BlockLine};
 use super::model::{Normal, Residual};
-use super::parameters::{COMPLIANCE, HAMMER, Parameters};
+use super::parameters::{CENTRE, COMPLIANCE, HAMMER, Parameters};
 use crate::errors_in_variables::NoiseInflation;
 use crate::frf::noise::shared_by_lines;
 use crate::parallel::prelude::*;
@@ -110,8 +110,10 @@ pub fn solve(
     sigma_per_s: f64,
 ) -> Result<(Vec<Block>, Solution), ContactError> {
     let shared = shared_by_lines(sigma_per_s, distance_hz(blocks));
+    let mut from = parameters.start();
+    Posterior { blocks, parameters, shared }.centre(&mut from)?;
     let searched: Vec<Result<Minimum, ContactError>> =
-        starts.par_iter().map(|start| search(blocks, parameters, start, shared)).collect();
+        starts.par_iter().map(|start| search(blocks, parameters, &from, start, shared)).collect();
     let reached: Vec<(f64, Vec<f64>)> =
         searched.iter().flatten().map(|found| (found.cost, found.place.p.clone())).collect();
     let mut refused = None;
@@ -163,11 +165,12 @@ fn not_converged() -> ContactError {
 fn search(
     blocks: &[Block],
     parameters: &Parameters,
+    from: &[f64],
     start: &Start,
     shared: f64,
 ) -> Result<Minimum, ContactError> {
     let mut blocks = blocks.to_vec();
-    let (mut searched, mut p) = (parameters.clone(), parameters.start());
+    let (mut searched, mut p) = (parameters.clone(), from.to_vec());
     for (at, value) in &start.held {
         searched.hold(*at, *value);
         p[*at] = *value;
@@ -295,6 +298,38 @@ impl Posterior<'_> {
         Ok((here, false))
     }
 
+    /// Moves the contact's centre to where the cost is smallest along each axis, if it is much
+    /// smaller there. Where the faces rock on each other, the cost bends the wrong way between the
+    /// stated place and one some standard deviations off, so that steps of all parameters together
+    /// end elsewhere.
+    fn centre(&self, p: &mut [f64]) -> Result<(), ContactError> {
+        for at in [CENTRE, CENTRE + 1] {
+            let own = &self.parameters.all()[at];
+            if !(own.sigma.is_finite() && own.sigma > 0.0) {
+                continue;
+            }
+            let cost = |value: f64| -> Result<f64, ContactError> {
+                let mut there = p.to_vec();
+                there[at] = value;
+                let bins = evaluate(self.blocks, &there, None)?;
+                let noise: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
+                Ok(self.prior(&there) + noise / self.shared)
+            };
+            let stated = cost(p[at])?;
+            let step = own.sigma / PER_SIGMA;
+            let places: Vec<f64> = (-FAR..=FAR).map(|n| own.start + f64::from(n) * step).collect();
+            let costs: Vec<f64> = places.iter().map(|place| cost(*place)).collect::<Result<_, _>>()?;
+            // at an end it may be smaller still
+            let inside = (1..costs.len() - 1).min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+            let Some(least) = inside.filter(|least| costs[*least] < MUCH_SMALLER * stated) else { continue };
+            let bend = costs[least - 1] + costs[least + 1] - 2.0 * costs[least];
+            let beyond =
+                if bend > 0.0 { 0.5 * step * (costs[least - 1] - costs[least + 1]) / bend } else { 0.0 };
+            p[at] = places[least] + beyond;
+        }
+        Ok(())
+    }
+
     fn place(&self, p: Vec<f64>, motion: &Motion) -> Result<SearchPoint, ContactError> {
         let bins = evaluate(self.blocks, &p, Some(motion))?;
         let noise: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
@@ -343,6 +378,15 @@ impl Posterior<'_> {
         (information, gradient)
     }
 }
+
+/// Steps in a standard deviation, and in all to each side, in which a start of the contact's centre
+/// is looked for.
+const PER_SIGMA: f64 = 2.0;
+const FAR: i32 = 6;
+
+/// Part of the cost at the stated place, below which the search starts elsewhere: errors of other
+/// places and of what is stated of the specimens change it less.
+const MUCH_SMALLER: f64 = 0.1;
 
 fn distance_hz(blocks: &[Block]) -> f64 {
     let lines = blocks.iter().map(|block| &block.lines).find(|lines| lines.len() > 1);

@@ -50,6 +50,10 @@ pub(super) struct World {
     pub(super) bulk: [f64; 2],
     /// Compliance of specimen B against arm B (m/N), and the part of it that is rotation, 1/m.
     pub(super) tip: [f64; 2],
+    /// Distance of the contact's centre from its stated place along x, m.
+    pub(super) centre_m: f64,
+    /// Factor of specimen A's rotations: many times the usual ones if the faces rock on each other.
+    pub(super) rocks: f64,
     /// Relative errors of gain of the vibrometers of spots A and B.
     pub(super) gains: [f64; 2],
     /// Whether both are aimed near the third point of arm B while B alone is measured.
@@ -112,14 +116,16 @@ pub(super) fn measured(world: World) -> Vec<Cell> {
                 let mut s_ff = Vec::new();
                 for &f in &frequency_hz {
                     let s = line(f);
-                    let (b, a) = motion(&draw, s);
+                    let (b, mut a) = motion(&draw, s);
+                    a[3..].iter_mut().for_each(|turn| *turn *= world.rocks);
                     let form = b[2] * (BESIDE + MASS * s * s) + b[3] * MASS * LEVER_M * s * s;
                     let force = if structure == Structure::B { C::from(along_z) } else { C::from(1.3) };
                     let t = force - form;
                     // surface of specimen B at the contact, then its material at the spot
                     let [tip, turning] = world.tip;
                     let tip_b = tip * (1.0 + turning * SPOTS[1][1]);
-                    let z_a = b[2] + force * tip + force / (K + DAMPING * s);
+                    let lever = world.centre_m * (a[4] - b[4]);
+                    let z_a = b[2] + force * tip + force / (K + DAMPING * s) + lever;
                     let (of_b, turn_b) = ([b[0], b[1], b[2]], [b[3], b[4], b[5]]);
                     let (of_a, turn_a) = ([a[0], a[1], z_a], [a[3], a[4], a[5]]);
                     let mut at = if on_specimen { SPECIMEN[point - points] } else { ARM[point] };
@@ -264,6 +270,8 @@ pub(super) const QUIET: World = World {
     seed: 1,
     bulk: [0.0; 2],
     tip: [0.0; 2],
+    centre_m: 0.0,
+    rocks: 1.0,
     gains: [0.0; 2],
     together: false,
     hammer: 0.0,
@@ -352,6 +360,17 @@ fn without_noise_the_contact_is_found_to_a_thousandth() {
     let sigma = (low.recip() - high.recip()) / (2.0 * 1.96) * found.k_t_n_per_m.mean;
     // 1.96 instead of the exact quantile
     assert!((sigma / budget.sqrt() - 1.0).abs() < 1e-3, "the budget adds up: {sigma} {budget}");
+}
+
+#[test]
+fn a_centre_far_from_its_stated_place_is_found_where_the_faces_rock() {
+    for centre_m in [-1.7e-3, 1.6e-3] {
+        let cells = measured(World { centre_m, rocks: 500.0, ..QUIET });
+        let mut input = input(&cells);
+        input.priors.contact_across_m = 1e-3;
+        let found = stiffness(&input).expect("all is there").k_t_n_per_m;
+        assert!((found.mean / K - 1.0).abs() < 0.01, "{centre_m}: {found:?}");
+    }
 }
 
 #[test]
