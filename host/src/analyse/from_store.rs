@@ -715,6 +715,7 @@ impl CampaignFile {
         source.link = store.link_counters()?;
         source.calibrations = calibrated(store)?;
         source.structure_changes = store.structure_changes()?;
+        source.measured_again = store.measured_again()?;
         source.temperature_c = temperature_c(store)?;
         Ok(source)
     }

@@ -453,6 +453,10 @@ pub struct Source {
     /// Evidence of each change of structure that was accepted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub structure_changes: Vec<String>,
+    /// What was measured again after the hits, for each time that it was entered: places,
+    /// directions, and what is known beforehand.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub measured_again: Vec<String>,
     /// The specimen's temperature measured by the controller: minimum, mean and maximum over all
     /// sessions, °C.
     #[serde(skip_serializing_if = "Option::is_none")]

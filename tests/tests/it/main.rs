@@ -28,6 +28,7 @@ mod mishaps;
 mod modes;
 mod next_cell;
 mod own_rig;
+mod places;
 mod plan_command;
 mod python;
 mod quiet;

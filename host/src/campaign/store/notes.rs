@@ -5,7 +5,7 @@ use rusqlite::{Connection, OptionalExtension};
 use super::Store;
 use super::error::StoreError;
 use super::table::{Row, table};
-use crate::campaign::plan::Plan;
+use crate::campaign::plan::{Plan, measured_again};
 
 table! {
     /// A plan; the last one is in effect.
@@ -50,8 +50,16 @@ pub(super) fn write_log(connection: &Connection, text: &str) -> rusqlite::Result
     LogLine { utc: utc_now(), text: text.into() }.insert(connection, &[])
 }
 
+/// Writes a note about the whole campaign.
+fn write_meta(connection: &Connection, key: &str, value: &str) -> rusqlite::Result<()> {
+    connection.execute("INSERT OR REPLACE INTO meta VALUES (?1, ?2)", [key, value]).map(|_| ())
+}
+
 /// Key of the note with the accepted changes of the structure: a JSON list of sentences.
 const STRUCTURES: &str = "structure_changes";
+
+/// Key of the note with what was measured again: a JSON list of sentences.
+const MEASURED_AGAIN: &str = "measured_again";
 
 impl Store {
     /// Notes that the campaign continues on another structure, and the evidence for it.
@@ -68,11 +76,46 @@ impl Store {
     /// # Errors
     /// The note cannot be read.
     pub fn structure_changes(&self) -> Result<Vec<String>, StoreError> {
+        self.sentences(STRUCTURES)
+    }
+
+    /// What was measured again, for each time that it was entered.
+    ///
+    /// # Errors
+    /// The note cannot be read.
+    pub fn measured_again(&self) -> Result<Vec<String>, StoreError> {
+        self.sentences(MEASURED_AGAIN)
+    }
+
+    fn sentences(&self, key: &str) -> Result<Vec<String>, StoreError> {
         let read = |text: String| {
-            serde_json::from_str(&text)
-                .map_err(|error| self.content(format!("the note {STRUCTURES}: {error}")))
+            serde_json::from_str(&text).map_err(|error| self.content(format!("the note {key}: {error}")))
         };
-        Ok(self.meta(STRUCTURES)?.map(read).transpose()?.unwrap_or_default())
+        Ok(self.meta(key)?.map(read).transpose()?.unwrap_or_default())
+    }
+
+    /// Takes over the plan in `text`, which errors call `source`, as far as it states places and
+    /// what is known beforehand: they were measured again. Records and cells stay, and so do the
+    /// earlier plans. Returns what is stated differently, a sentence each.
+    ///
+    /// # Errors
+    /// The plan is wrong, or differs in something else, or in nothing.
+    pub fn measure_again(&self, text: &str, source: &str, reason: &str) -> Result<Vec<String>, StoreError> {
+        Plan::parse_new(text, source)?;
+        let changes = measured_again(&self.plan_text()?.0, text).map_err(|what| StoreError::PlanChange {
+            path: self.path.clone(),
+            source_name: source.into(),
+            what,
+        })?;
+        let mut all = self.measured_again()?;
+        all.push(format!("{}: {reason}: {}", utc_now(), changes.join("; ")));
+        let note = serde_json::to_string(&all).map_err(|error| self.content(error.to_string()))?;
+        self.change("entering what was measured again", |connection| {
+            write_plan(connection, text, source)?;
+            write_meta(connection, MEASURED_AGAIN, &note)?;
+            write_log(connection, &format!("measured again ({source}): {reason}: {}", changes.join("; ")))
+        })?;
+        Ok(changes)
     }
 
     /// The current plan.
@@ -109,9 +152,7 @@ impl Store {
 
     /// Writes a note about the whole campaign.
     pub fn set_meta(&self, key: &str, value: &str) -> Result<(), StoreError> {
-        self.change("writing notes", |connection| {
-            connection.execute("INSERT OR REPLACE INTO meta VALUES (?1, ?2)", [key, value]).map(|_| ())
-        })
+        self.change("writing notes", |connection| write_meta(connection, key, value))
     }
 
     /// The lines of the log after line `after`, in order: id, time (RFC 3339, UTC), text.

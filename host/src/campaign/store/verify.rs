@@ -161,7 +161,8 @@ impl Store {
             }
             if let Some(point) = moved(&old, &new, impact, response) {
                 return refuse(format!(
-                    "`{point}` has records and must stay where it is; give the other place another name"
+                    "`{point}` has records and must stay where it is; give another place another name, or, if the same place was \
+                     measured again, enter it with `campaign places`"
                 ));
             }
         }

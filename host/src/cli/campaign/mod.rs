@@ -1,4 +1,4 @@
-//! `campaign new | run | next | status | show | drop | keep | calibrate | check | verify | backup`.
+//! `campaign new | run | next | status | show | drop | keep | calibrate | places | check | verify | backup`.
 //!
 //! `campaign backup`: a verified copy, even while the campaign runs.
 //!
@@ -20,6 +20,7 @@ use std::path::PathBuf;
 mod calibrate;
 mod check;
 mod next;
+mod places;
 pub mod run;
 mod show;
 mod status;
@@ -50,6 +51,9 @@ enum Command {
     Keep(Overrule),
     /// Enter calibrations of sensors, even after the campaign; results are recomputed with them.
     Calibrate(calibrate::Calibrate),
+    /// Enter places that were measured again, even after the campaign; results are recomputed with
+    /// them.
+    Places(places::Places),
     /// Check the sign of every channel, and hammer against vibrometer on a known mass.
     Check(check::Check),
     /// Check every record's checksum; exits with 1 if anything is damaged.
@@ -69,6 +73,7 @@ impl Campaign {
             Command::Drop(command) => command.drop(),
             Command::Keep(command) => command.keep(),
             Command::Calibrate(command) => command.run(),
+            Command::Places(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::Verify(command) => command.run(),
             Command::Backup(command) => command.run(),

@@ -106,6 +106,7 @@ pub fn provenance(results: &Results) -> String {
         let text = format!("{} °C on average, {} to {} °C", value(mean), value(least), value(most));
         ("temperature of the specimen".into(), text)
     }));
+    rows.extend(source.measured_again.iter().map(|again| ("measured again".into(), again.clone())));
     rows.extend(source.device.iter().map(|(k, v)| (format!("device: {}", spaced(k)), v.clone())));
     rows.extend(source.settings.iter().map(|(k, v)| {
         let text = v.as_str().map_or_else(|| v.to_string(), str::to_owned);

@@ -164,7 +164,9 @@ pub fn of_contradiction(one: &Contradiction) -> String {
         }
         Cause::HammerTilt => format!("{name} seems off by {off}: check the direction of these hits."),
         Cause::SensorAxes => format!("{name} seems off by {off}: check how it is mounted."),
-        _ => format!("{name} seems off by {off}: measure its place again."),
+        _ => format!(
+            "{name} seems off by {off}: measure its place again, and enter it with `jointrig campaign places`."
+        ),
     }
 }
 
@@ -362,7 +364,10 @@ mod tests {
         let exchanged = Contradiction { exchanged_with: Some("point C1".into()), ..point.clone() };
         let kind = Contradiction { scatter: Some(2.9), off: Vec::new(), ..point.clone() };
         for (one, wanted) in [
-            (&point, "Point C3 seems off by 1.20 mm along y: measure its place again."),
+            (
+                &point,
+                "Point C3 seems off by 1.20 mm along y: measure its place again, and enter it with `jointrig campaign places`.",
+            ),
             (&gain, "The gain of the vibrometer on A's spot seems off by 4.3 %: calibrate it again."),
             (&exchanged, "Point C3 was found where the plan has point C1"),
             (&kind, "The positions of the points on the specimen are off 2.9 times as far as stated"),
