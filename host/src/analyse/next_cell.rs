@@ -14,7 +14,8 @@ use super::separate_cells::{known_mass, second_path};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::contact::{
-    Axes, Cause, ContactError, Doubt, Forecast, Interval, PlannedCell, SecondPath, Stiffness, forecast,
+    Axes, Cause, ContactError, Doubt, Forecast, ForecastCell, Interval, PlannedCell, SecondPath, Stiffness,
+    forecast,
 };
 use crate::structure::Structure;
 use rayon::prelude::*;
@@ -45,6 +46,9 @@ pub struct Times {
     pub hammer_s: f64,
     /// Changing the structure, from B alone to the assembly or back.
     pub structure_s: f64,
+    /// Measuring the places of one cause again, with half their stated errors; `None` if nobody
+    /// will.
+    pub again_s: Option<f64>,
 }
 
 impl Times {
@@ -56,7 +60,8 @@ impl Times {
     /// The usual durations, with the record length of the plan.
     pub fn of(plan: &Plan) -> Self {
         let [vibrometer_s, hammer_s, structure_s] = Self::MOVES_S;
-        Times { hit_s: plan.record.get_ref().length_s + Self::REST_S, vibrometer_s, hammer_s, structure_s }
+        let hit_s = plan.record.get_ref().length_s + Self::REST_S;
+        Times { hit_s, vibrometer_s, hammer_s, structure_s, again_s: None }
     }
 
     /// Duration of the moves from one cell to another, s; the first cell of all needs both. Sensors
@@ -144,6 +149,17 @@ pub struct Dominating {
     /// Relative half width of k_T's interval if its stated errors were half as large; `None` if
     /// nothing is stated of it.
     pub half_width_if_halved: Option<f64>,
+}
+
+/// Places that are measured again.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Again {
+    /// Which.
+    pub cause: Cause,
+    /// Duration, s.
+    pub seconds: f64,
+    /// Relative half width of k_T's 95 % interval with half their stated errors.
+    pub half_width: f64,
 }
 
 /// Cells averaged before, so that only those with new hits are read again.
@@ -277,12 +293,34 @@ impl Outlook {
     }
 
     /// Whether ever more hits in the cells of one structure, or in all, could make the half width
-    /// this small: if the part of the variance that falls with the hits falls as their number.
+    /// this small. More hits also show more of the places, so it shrinks further than a line through
+    /// the variances at two numbers of hits, over one over these numbers, would have it.
     pub fn within_reach(&self, until: f64, of: Option<Structure>) -> bool {
-        let (now, grown, growth) = (self.half_width().powi(2), self.grown(of).powi(2), GROWTH as f64);
-        // now = rest + noise, grown = rest + noise / growth
-        let rest = (growth * grown - now) / (growth - 1.0);
-        until.powi(2) > rest
+        let all = |cell: &ForecastCell| of.is_none_or(|of| cell.structure == of);
+        self.forecast.half_width_with_hits(EVER, all) <= until
+    }
+
+    /// What a person can measure again, if that is allowed: half widths with half the stated errors
+    /// of the places, one cause at a time, the smallest first.
+    pub fn again(&self) -> Vec<Again> {
+        let Some(seconds) = self.times.again_s else { return Vec::new() };
+        let halved = |cause| Again { cause, seconds, half_width: self.forecast.half_width_with(cause, 0.5) };
+        let budget = self.budget();
+        let stated = PLACES.into_iter().filter(|cause| budget.get(cause).is_some_and(|share| *share > 0.0));
+        let mut all: Vec<Again> = stated.map(halved).collect();
+        all.sort_by(|one, other| one.half_width.total_cmp(&other.half_width));
+        all
+    }
+
+    /// The places that shrink the interval more per minute when they are measured again than these
+    /// visits do.
+    pub fn rather_again(&self, visits: &[Visit]) -> Option<Again> {
+        let now = self.half_width();
+        let seconds: f64 = visits.iter().map(|visit| visit.seconds).sum();
+        let by_hits = visits.last().map_or(0.0, |last| gain(now, last.half_width) / seconds);
+        let best = self.again().into_iter().next()?;
+        let by_places = gain(now, best.half_width) / best.seconds.max(1.0);
+        (by_places > by_hits && gain(now, best.half_width) > WORTH_A_STOP * now).then_some(best)
     }
 
     /// A visit to the cell with this index from `from`.
@@ -417,6 +455,15 @@ impl Outlook {
 /// Largest ratio of a cell's hits to those of the fit: how well its signals follow the model below
 /// its present noise, only more hits show.
 pub const GROWTH: usize = 4;
+
+/// Ratio of a cell's hits to those of the fit that leaves no noise to speak of.
+const EVER: usize = 1000;
+
+/// The causes that are places, which a person can measure again.
+const PLACES: [Cause; 4] = [Cause::Spots, Cause::Centre, Cause::SpecimenPoints, Cause::ArmPoints];
+
+/// Part of the half width that a run is not stopped for.
+const WORTH_A_STOP: f64 = 0.02;
 
 /// A change of the relative half width below this is none.
 const NOTHING: f64 = 1e-7;

@@ -7,11 +7,17 @@ use jointrig::analyse::next_cell::{Averaged, Outlook, Times, Visit, outlook};
 use jointrig::campaign::plan::structure;
 use jointrig::campaign::run::further::{Choice, ChooseFurther, Further, FurtherCell};
 use jointrig::campaign::store::Store;
+use jointrig::contact::ContactPriors;
+use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::campaign::{one_second, rows, run, run_further, short_contact_plan};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::drawn_campaigns::{count, each};
 use jointrig_tests::rigs::{Drawn, contact_plan, drawn};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Stdio;
 use std::thread::sleep;
@@ -101,38 +107,156 @@ fn simulated(rig: u64, folder: &Path) -> (jointrig::device::address::Address, St
     (address, one_second(&contact_plan(&own)))
 }
 
-/// Minutes that the plan's order with `wanted` hits in each cell takes, and that `--until` takes for
-/// the same half width.
-fn compared(rig: u64, folder: &Path, wanted: u32) -> (f64, f64, f64, f64) {
+/// The points and spots next to the contact, as the plan calls them.
+const POINTS: [&str; 7] = ["C1", "C2", "C3", "C4", "D1", "D2", "D3"];
+const SPOTS: [&str; 2] = ["LDV_A", "LDV_B"];
+
+/// The contact's centre, as the simulator calls it.
+const CENTRE: &str = "contact";
+
+/// A drawn rig whose places next to the contact are off by known amounts, so that they can be
+/// measured again.
+struct Placed {
+    rig: RigConfig,
+    plan: toml::Table,
+    /// Places in the plan at first, and in truth, m.
+    places_m: BTreeMap<&'static str, [[f64; 3]; 2]>,
+    random: Xoshiro256PlusPlus,
+}
+
+impl Placed {
+    fn new(number: u64) -> Self {
+        let mut rig = drawn(number, Drawn::default());
+        let plan = toml::from_str(&one_second(&contact_plan(&rig))).unwrap();
+        let random = Xoshiro256PlusPlus::seed_from_u64(0x09_1ace_0000 + number);
+        let sigma_m = [rig.errors.specimen_point_m, rig.errors.spot_m];
+        // drawn here instead of by the simulator
+        rig.errors.specimen_point_m = 0.0;
+        rig.errors.spot_m = 0.0;
+        let mut own = Placed { rig, plan, places_m: BTreeMap::new(), random };
+        let priors = own.plan["priors"].as_table_mut().unwrap();
+        let ContactPriors { contact_across_m, contact_height_m, .. } = ContactPriors::default();
+        priors.insert("contact_across_m".into(), contact_across_m.into());
+        priors.insert("contact_height_m".into(), contact_height_m.into());
+        let [point_m, spot_m] = sigma_m;
+        let all = POINTS.map(|name| (name, [point_m; 3])).into_iter();
+        let all = all.chain(SPOTS.map(|name| (name, [spot_m; 3])));
+        for (name, sigma_m) in all.chain([(CENTRE, [contact_across_m, contact_height_m, 0.0])]) {
+            let stated: Vec<f64> = place(&mut own.plan, name).clone().try_into().unwrap();
+            let stated_m: [f64; 3] = stated.try_into().unwrap();
+            let off_m = own.noise(sigma_m);
+            own.places_m.insert(name, [stated_m, [0, 1, 2].map(|axis| stated_m[axis] + off_m[axis])]);
+            let simulated = if SPOTS.contains(&name) { name.to_lowercase() } else { name.into() };
+            own.rig.errors.offset_m.insert(simulated, off_m);
+        }
+        own
+    }
+
+    fn noise(&mut self, sigma_m: [f64; 3]) -> [f64; 3] {
+        sigma_m.map(|sigma_m| sigma_m * self.random.sample::<f64, _>(StandardNormal))
+    }
+
+    /// Measures the places of one cause again, with half the errors that the plan states.
+    fn measure_again(&mut self, cause: &str) {
+        let (names, priors): (&[&'static str], [&str; 2]) = match cause {
+            "spots" => (&SPOTS, ["spot_m"; 2]),
+            "centre" => (&[CENTRE], ["contact_across_m", "contact_height_m"]),
+            "specimen-points" => (&POINTS, ["specimen_point_m"; 2]),
+            other => panic!("{other} is not measured again here"),
+        };
+        let [x, y] = priors.map(|prior| 0.5 * self.plan["priors"][prior].as_float().unwrap());
+        for (prior, half) in priors.into_iter().zip([x, y]) {
+            self.plan["priors"][prior] = half.into();
+        }
+        for name in names {
+            let error_m = self.noise([x, y, if *name == CENTRE { 0.0 } else { x }]);
+            let [_, true_m] = self.places_m[name];
+            *place(&mut self.plan, name) = (0..3).map(|i| true_m[i] + error_m[i]).collect::<Vec<_>>().into();
+        }
+    }
+}
+
+/// The place of a point, a spot or the contact in a plan, m.
+fn place<'a>(plan: &'a mut toml::Table, name: &str) -> &'a mut toml::Value {
+    let geometry = plan["geometry"].as_table_mut().unwrap();
+    if name == CENTRE {
+        return &mut geometry["virtual_point_m"];
+    }
+    let list = if SPOTS.contains(&name) { "sensor" } else { "response" };
+    let mut all = geometry[list].as_array_mut().unwrap().iter_mut();
+    &mut all.find(|own| own["name"].as_str() == Some(name)).unwrap()["position_m"]
+}
+
+/// Half width that the plan's order with `wanted` hits in each cell reaches, the one that `--until`
+/// reaches, and the minutes of both. The places may be measured again in this many minutes for each
+/// cause.
+fn compared(number: u64, folder: &Path, wanted: u32, again_min: Option<u32>) -> (f64, f64, f64, f64) {
     let begun = Instant::now();
-    let (address, plan) = simulated(rig, folder);
-    let fixed = folder.join(format!("{rig}-fixed.jrig"));
-    let all = plan.replace("wanted = 6", &format!("wanted = {wanted}")).replace("most = 12", "most = 60");
-    run(&fixed, &all, address.open(rig).unwrap());
+    let mut placed = Placed::new(number);
+    let description = folder.join(format!("{number}.toml"));
+    std::fs::write(&description, placed.rig.to_toml()).unwrap();
+    let address: jointrig::device::address::Address =
+        format!("sim:{}", description.display()).parse().unwrap();
+    let fixed = folder.join(format!("{number}-fixed.jrig"));
+    placed.plan["hits"]["most"] = 100.into();
+    let with = |plan: &toml::Table, wanted: u32| {
+        let mut plan = plan.clone();
+        plan["hits"]["wanted"] = i64::from(wanted).into();
+        toml::to_string(&plan).unwrap()
+    };
+    run(&fixed, &with(&placed.plan, wanted), address.open(number).unwrap());
     let until = outlook_of(&fixed).half_width();
-    let (text, file) = (folder.join(format!("{rig}-plan.toml")), folder.join(format!("{rig}-until.jrig")));
-    std::fs::write(&text, &all).unwrap();
+    let (text, file) =
+        (folder.join(format!("{number}-plan.toml")), folder.join(format!("{number}-until.jrig")));
+    std::fs::write(&text, with(&placed.plan, 6)).unwrap();
     let out = jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&text).output().unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let out = jointrig()
-        .args(["campaign", "run"])
-        .arg(&file)
-        .args(["--device", &address.to_string(), "--seed", &rig.to_string()])
-        .args(["--until", &format!("{}%", 100.0 * until), "--further-hits", "3000", "--hit-s", "5"])
-        .output()
-        .unwrap();
-    let (took, most) = (minutes(&file), minutes(&fixed));
+    let run_until = || {
+        let mut command = jointrig();
+        command.args(["campaign", "run"]).arg(&file);
+        command.args(["--device", &address.to_string(), "--seed", &number.to_string()]);
+        command.args(["--until", &format!("{}%", 100.0 * until), "--further-hits", "3000", "--hit-s", "5"]);
+        if let Some(minutes) = again_min {
+            command.args(["--again-min", &minutes.to_string()]);
+        }
+        let out = command.output().unwrap();
+        (out.status.success(), String::from_utf8(out.stderr).unwrap())
+    };
+    let (mut reached, mut said) = run_until();
+    let mut again = Vec::new();
+    while said.contains("campaign places") {
+        let store = Store::open_read_only(&file).unwrap();
+        let times = Times {
+            again_s: again_min.map(|minutes| 60.0 * f64::from(minutes)),
+            ..Times::of(&store.plan().unwrap())
+        };
+        let best = outlook(&store, times, &mut Averaged::default()).unwrap().again()[0].cause.name();
+        drop(store);
+        placed.measure_again(best);
+        again.push(best);
+        std::fs::write(&text, with(&placed.plan, 6)).unwrap();
+        let out = (jointrig().args(["campaign", "places", "--reason", "again"]).arg(&file))
+            .arg("--plan")
+            .arg(&text)
+            .output()
+            .unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        (reached, said) = run_until();
+    }
+    let measuring = again_min.unwrap_or(0) as usize * again.len();
+    let (took, most) = (minutes(&file) + measuring as f64, minutes(&fixed));
     let achieved = outlook_of(&file).half_width();
     println!(
-        "rig {rig}: {:.2} % wanted, {:.2} % achieved, {took:.1} of {most:.1} min: {:.0} %{} ({:.0} s)",
+        "rig {number}: {:.2} % wanted, {:.2} % achieved, {took:.1} of {most:.1} min: {:.0} %{}; again: {} ({:.0} s)",
         100.0 * until,
         100.0 * achieved,
         100.0 * took / most,
-        if out.status.success() { "" } else { " NOT REACHED" },
+        if reached { "" } else { " NOT REACHED" },
+        again.join(", "),
         begun.elapsed().as_secs_f64()
     );
-    if !out.status.success() {
-        println!("{}", String::from_utf8_lossy(&out.stderr).lines().last().unwrap_or_default());
+    if !reached {
+        println!("{}", said.lines().last().unwrap_or_default());
     }
     (until, achieved, took, most)
 }
@@ -154,7 +278,9 @@ fn until_takes_fewer_minutes_than_the_plans_order() {
     let (first, rigs) = (count("FIRST", 12_010), count("RIGS", 30));
     let folder = tempfile::tempdir().unwrap();
     let numbers: Vec<u64> = (first..first + rigs).collect();
-    let all = each(&numbers, |rig| compared(*rig, folder.path(), count("WANTED", 8) as u32));
+    let (wanted, again_min) = (count("WANTED", 16) as u32, count("AGAIN_MIN", 0) as u32);
+    let again_min = (again_min > 0).then_some(again_min);
+    let all = each(&numbers, |rig| compared(*rig, folder.path(), wanted, again_min));
     let reached = all.iter().filter(|(until, achieved, ..)| achieved <= until).count();
     let mut parts: Vec<f64> = all.iter().map(|(_, _, took, most)| took / most).collect();
     parts.sort_by(f64::total_cmp);

@@ -23,7 +23,7 @@ use super::shot::Shooter;
 use super::stage::Stage;
 use super::stage::{meanwhile, same_or_accepted};
 use super::tally::Tally;
-use crate::campaign::plan::{Force, Plan};
+use crate::campaign::plan::{Force, Plan, structure};
 use crate::campaign::store::Store;
 use crate::campaign::store::cell_table::CellRow;
 use crate::campaign::store::error::StoreError;
@@ -40,6 +40,7 @@ use crate::device::channels::ChannelMap;
 use crate::device::session::Session;
 use crate::device::stream::Accounts;
 use crate::device::stream::Recording;
+use crate::structure::Structure;
 use jointrig_protocol::channel::{Role, words_per_scan};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -145,9 +146,10 @@ pub fn run(
     }
     let (mut cells, records) = (store.cells()?, store.records()?);
     if options.further.is_some() {
-        // the chooser decides which cells get more
+        // The chooser decides which cells get more. B alone cannot be struck again once the assembly
+        // is put together, so its cells get all that the plan wants.
         let minimum = plan.hits.get_ref().minimum;
-        for row in &mut cells {
+        for row in cells.iter_mut().filter(|row| structure(row.cell.configuration) != Structure::B) {
             row.cell.wanted = row.cell.wanted.min(minimum);
         }
     }

@@ -49,6 +49,10 @@ pub struct Durations {
     /// Duration of changing from the assembly to B alone or back, s [default: 1800].
     #[arg(long, value_name = "S", value_parser = output::not_negative)]
     structure_s: Option<f64>,
+    /// Duration of measuring the places of one cause again (spots, contact, points) with half their
+    /// stated errors, min; without it, only hits are considered.
+    #[arg(long, value_name = "MIN", value_parser = output::positive)]
+    again_min: Option<f64>,
 }
 
 impl Durations {
@@ -60,6 +64,7 @@ impl Durations {
             vibrometer_s: self.vibrometer_s.unwrap_or(usual.vibrometer_s),
             hammer_s: self.hammer_s.unwrap_or(usual.hammer_s),
             structure_s: self.structure_s.unwrap_or(usual.structure_s),
+            again_s: self.again_min.map(|minutes| 60.0 * minutes),
         })
     }
 }
@@ -93,6 +98,7 @@ impl Next {
         output::lines(
             std::iter::once(say::table_head()).chain(cells.iter().take(SHOWN).map(say::table_row)),
         )?;
+        output::lines(found.again().iter().map(say::again_row))?;
         let mut limits = say::limits(&found);
         if let (Some(until), Some(route)) = (self.until, &route) {
             let told = say::route(&found, until, self.further_hits, route);
@@ -147,6 +153,9 @@ fn document(found: &Outlook, cells: &[Visit], until: Option<f64>, route: Option<
         "half_width": finite(found.half_width()),
         "hits": found.hits,
         "doubts": found.doubts,
+        "again": found.again().iter().map(|own| json!({
+            "cause": own.cause.name(), "minutes": own.seconds / 60.0, "half_width": finite(own.half_width),
+        })).collect::<Vec<_>>(),
         "slips": found.slips,
         "times": found.times,
         "cells": cells.iter().map(visit).collect::<Vec<_>>(),
@@ -221,12 +230,15 @@ impl ChooseFurther for Until {
         let elsewhere = |cell: &CellName| found.mounted().is_some_and(|own| own != cell.configuration);
         let route =
             found.route(self.half_width, self.left, &|cell| elsewhere(cell) || excluded(&further(cell, 0)));
+        let now = route.len().div_ceil(BEFORE_THE_NEXT);
+        if let Some(again) = found.rather_again(&route[..now]) {
+            return Ok(Choice::Enough { reached: false, why: say::rather_again(&found, &again) });
+        }
         // what is beyond the predicted hits is predicted again with those on the way there
         if route.is_empty() || !found.within_reach(self.half_width, found.mounted()) || self.left == 0 {
             let why = say::route(&found, self.half_width, self.left, &route);
             return Ok(Choice::Enough { reached: false, why });
         }
-        let now = route.len().div_ceil(BEFORE_THE_NEXT);
         let cells: Vec<FurtherCell> =
             route[..now].iter().map(|visit| further(&visit.cell, visit.more)).collect();
         self.left -= cells.iter().map(|cell| cell.more as usize).sum::<usize>();

@@ -2,7 +2,7 @@
 //! it when they hardly help.
 
 use super::answer_sentences::{of_cause, with_interval};
-use crate::analyse::next_cell::{Dominating, GROWTH, Outlook, Visit};
+use crate::analyse::next_cell::{Again, Dominating, GROWTH, Outlook, Visit};
 use crate::contact::Cause;
 use crate::structure::Structure;
 
@@ -56,6 +56,28 @@ pub fn table_row(visit: &Visit) -> String {
     let name = format!("{} {} {}", cell.configuration.name(), cell.impact, cell.response);
     let minutes = visit.seconds / 60.0;
     format!("{name:<20} {:>4} {:>5} {minutes:>8.1}   {}", visit.hits, visit.more, half(visit.half_width))
+}
+
+/// A row of the table of cells for places that are measured again.
+pub fn again_row(again: &Again) -> String {
+    let minutes = again.seconds / 60.0;
+    format!("{:<31} {minutes:>8.1}   {}", measured_again(again), half(again.half_width))
+}
+
+fn measured_again(again: &Again) -> String {
+    format!("again: {}", of_cause(again.cause))
+}
+
+/// That places should be measured again before further hits, and how the run goes on.
+pub fn rather_again(found: &Outlook, again: &Again) -> String {
+    format!(
+        "k_T is known to {}; half the errors of {} would give {} in {:.0} min, which is more per minute than further hits: measure them again, \
+         enter them with `jointrig campaign places`, and run the same command again (or without --again-min)",
+        half(found.half_width()),
+        of_cause(again.cause),
+        half(again.half_width),
+        again.seconds / 60.0
+    )
 }
 
 /// When the wanted half width is reached, or why it is not.
