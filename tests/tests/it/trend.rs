@@ -257,7 +257,7 @@ fn bench() -> RigConfig {
 #[test]
 #[ignore = "docs/studies.md: how often a drift of 5 % is found in 20 simulated campaigns"]
 fn drifts_are_found_in_series_of_simulated_campaigns() {
-    let one_of = count("EACH", 4) as usize;
+    let one_of = count("EACH", 3) as usize;
     let numbers: Vec<u64> = (0..(2 * LONG * one_of) as u64).collect();
     // the first half is measured on a contact that is up to 5 % stiffer, the other half on one
     let drifted = |number: u64| {

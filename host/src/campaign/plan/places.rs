@@ -121,7 +121,7 @@ mod tests {
                 "{ name = \"C1\", grouping = 6",
                 "geometry.response.C1.grouping",
             ),
-            ("{ name = \"I_MZ\"", "{ name = \"I_M\"", "geometry.impact.I_M.direction"),
+            ("{ name = \"I_MZ\"", "{ name = \"I_M\"", "geometry.impact.I_M.grouping"),
         ] {
             let refused = measured_again(CONTACT, &with(from, to)).expect_err(named);
             assert!(refused.starts_with(&format!("`{named}`")), "{refused}");
