@@ -61,11 +61,8 @@ pub fn table_row(visit: &Visit) -> String {
 /// A row of the table of cells for places that are measured again.
 pub fn again_row(again: &Again) -> String {
     let minutes = again.seconds / 60.0;
-    format!("{:<31} {minutes:>8.1}   {}", measured_again(again), half(again.half_width))
-}
-
-fn measured_again(again: &Again) -> String {
-    format!("again: {}", of_cause(again.cause))
+    let what = format!("again: {}", again.cause.name());
+    format!("{what:<31} {minutes:>8.1}   {}", half(again.half_width))
 }
 
 /// That places should be measured again before further hits, and how the run goes on.
