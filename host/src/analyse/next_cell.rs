@@ -46,8 +46,8 @@ pub struct Times {
     pub hammer_s: f64,
     /// Changing the structure, from B alone to the assembly or back.
     pub structure_s: f64,
-    /// Measuring the places of one cause again, with half their stated errors; `None` if nobody
-    /// will.
+    /// Measuring the places of one cause again, with half their stated errors; `None` if that is
+    /// not possible.
     pub again_s: Option<f64>,
 }
 
@@ -293,8 +293,8 @@ impl Outlook {
     }
 
     /// Whether ever more hits in the cells of one structure, or in all, could make the half width
-    /// this small. More hits also show more of the places, so it shrinks further than a line through
-    /// the variances at two numbers of hits, over one over these numbers, would have it.
+    /// this small. More hits also locate the places better, so the variance is no straight line over
+    /// 1/hits: extrapolating one would give up too early.
     pub fn within_reach(&self, until: f64, of: Option<Structure>) -> bool {
         let all = |cell: &ForecastCell| of.is_none_or(|of| cell.structure == of);
         self.forecast.half_width_with_hits(EVER, all) <= until
@@ -319,7 +319,7 @@ impl Outlook {
         let seconds: f64 = visits.iter().map(|visit| visit.seconds).sum();
         let by_hits = visits.last().map_or(0.0, |last| gain(now, last.half_width) / seconds);
         let best = self.again().into_iter().next()?;
-        let by_places = gain(now, best.half_width) / best.seconds.max(1.0);
+        let by_places = gain(now, best.half_width) / best.seconds;
         (by_places > by_hits && gain(now, best.half_width) > WORTH_A_STOP * now).then_some(best)
     }
 
@@ -456,13 +456,13 @@ impl Outlook {
 /// its present noise, only more hits show.
 pub const GROWTH: usize = 4;
 
-/// Ratio of a cell's hits to those of the fit that leaves no noise to speak of.
+/// Ratio of a cell's hits to those of the fit at which their noise is negligible.
 const EVER: usize = 1000;
 
 /// The causes that are places, which a person can measure again.
 const PLACES: [Cause; 4] = [Cause::Spots, Cause::Centre, Cause::SpecimenPoints, Cause::ArmPoints];
 
-/// Part of the half width that a run is not stopped for.
+/// A run stops for places only if they shrink the half width by more than this part.
 const WORTH_A_STOP: f64 = 0.02;
 
 /// A change of the relative half width below this is none.

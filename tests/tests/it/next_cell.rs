@@ -7,11 +7,15 @@ use jointrig::analyse::next_cell::{Averaged, Outlook, Times, Visit, outlook};
 use jointrig::campaign::plan::structure;
 use jointrig::campaign::run::further::{Choice, ChooseFurther, Further, FurtherCell};
 use jointrig::campaign::store::Store;
+use jointrig::campaign::verdict::Verdict;
 use jointrig::contact::ContactPriors;
+use jointrig::device::address::Address;
+use jointrig::structure::Structure;
 use jointrig_hil_sim::rig::RigConfig;
 use jointrig_tests::campaign::{one_second, rows, run, run_further, short_contact_plan};
 use jointrig_tests::command::jointrig;
 use jointrig_tests::drawn_campaigns::{count, each};
+use jointrig_tests::live::done;
 use jointrig_tests::rigs::{Drawn, contact_plan, drawn};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -99,12 +103,15 @@ fn predicted(rig: u64, folder: &Path, factor: f64) -> [f64; 2] {
     [predicted, achieved]
 }
 
-fn simulated(rig: u64, folder: &Path) -> (jointrig::device::address::Address, String) {
+fn simulated(rig: u64, folder: &Path) -> (Address, String) {
     let own = drawn(rig, Drawn::default());
-    let description = folder.join(format!("{rig}.toml"));
-    std::fs::write(&description, own.to_toml()).unwrap();
-    let address = format!("sim:{}", description.display()).parse().unwrap();
-    (address, one_second(&contact_plan(&own)))
+    (address_of(&own, rig, folder), one_second(&contact_plan(&own)))
+}
+
+fn address_of(rig: &RigConfig, number: u64, folder: &Path) -> Address {
+    let description = folder.join(format!("{number}.toml"));
+    std::fs::write(&description, rig.to_toml()).unwrap();
+    format!("sim:{}", description.display()).parse().unwrap()
 }
 
 /// The points and spots next to the contact, as the plan calls them.
@@ -119,8 +126,8 @@ const CENTRE: &str = "contact";
 struct Placed {
     rig: RigConfig,
     plan: toml::Table,
-    /// Places in the plan at first, and in truth, m.
-    places_m: BTreeMap<&'static str, [[f64; 3]; 2]>,
+    /// True places, m.
+    true_m: BTreeMap<&'static str, [f64; 3]>,
     random: Xoshiro256PlusPlus,
 }
 
@@ -133,7 +140,7 @@ impl Placed {
         // drawn here instead of by the simulator
         rig.errors.specimen_point_m = 0.0;
         rig.errors.spot_m = 0.0;
-        let mut own = Placed { rig, plan, places_m: BTreeMap::new(), random };
+        let mut own = Placed { rig, plan, true_m: BTreeMap::new(), random };
         let priors = own.plan["priors"].as_table_mut().unwrap();
         let ContactPriors { contact_across_m, contact_height_m, .. } = ContactPriors::default();
         priors.insert("contact_across_m".into(), contact_across_m.into());
@@ -145,7 +152,7 @@ impl Placed {
             let stated: Vec<f64> = place(&mut own.plan, name).clone().try_into().unwrap();
             let stated_m: [f64; 3] = stated.try_into().unwrap();
             let off_m = own.noise(sigma_m);
-            own.places_m.insert(name, [stated_m, [0, 1, 2].map(|axis| stated_m[axis] + off_m[axis])]);
+            own.true_m.insert(name, [0, 1, 2].map(|axis| stated_m[axis] + off_m[axis]));
             let simulated = if SPOTS.contains(&name) { name.to_lowercase() } else { name.into() };
             own.rig.errors.offset_m.insert(simulated, off_m);
         }
@@ -170,7 +177,7 @@ impl Placed {
         }
         for name in names {
             let error_m = self.noise([x, y, if *name == CENTRE { 0.0 } else { x }]);
-            let [_, true_m] = self.places_m[name];
+            let true_m = self.true_m[name];
             *place(&mut self.plan, name) = (0..3).map(|i| true_m[i] + error_m[i]).collect::<Vec<_>>().into();
         }
     }
@@ -187,16 +194,16 @@ fn place<'a>(plan: &'a mut toml::Table, name: &str) -> &'a mut toml::Value {
     &mut all.find(|own| own["name"].as_str() == Some(name)).unwrap()["position_m"]
 }
 
+/// Hits that the plan wants in each cell where `--until` chooses further ones.
+const AT_FIRST: u32 = 6;
+
 /// Half width that the plan's order with `wanted` hits in each cell reaches, the one that `--until`
 /// reaches, and the minutes of both. The places may be measured again in this many minutes for each
 /// cause.
 fn compared(number: u64, folder: &Path, wanted: u32, again_min: Option<u32>) -> (f64, f64, f64, f64) {
     let begun = Instant::now();
     let mut placed = Placed::new(number);
-    let description = folder.join(format!("{number}.toml"));
-    std::fs::write(&description, placed.rig.to_toml()).unwrap();
-    let address: jointrig::device::address::Address =
-        format!("sim:{}", description.display()).parse().unwrap();
+    let address = address_of(&placed.rig, number, folder);
     let fixed = folder.join(format!("{number}-fixed.jrig"));
     placed.plan["hits"]["most"] = 100.into();
     let with = |plan: &toml::Table, wanted: u32| {
@@ -208,7 +215,7 @@ fn compared(number: u64, folder: &Path, wanted: u32, again_min: Option<u32>) -> 
     let until = outlook_of(&fixed).half_width();
     let (text, file) =
         (folder.join(format!("{number}-plan.toml")), folder.join(format!("{number}-until.jrig")));
-    std::fs::write(&text, with(&placed.plan, 6)).unwrap();
+    std::fs::write(&text, with(&placed.plan, AT_FIRST)).unwrap();
     let out = jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&text).output().unwrap();
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     let run_until = || {
@@ -234,7 +241,7 @@ fn compared(number: u64, folder: &Path, wanted: u32, again_min: Option<u32>) -> 
         drop(store);
         placed.measure_again(best);
         again.push(best);
-        std::fs::write(&text, with(&placed.plan, 6)).unwrap();
+        std::fs::write(&text, with(&placed.plan, AT_FIRST)).unwrap();
         let out = (jointrig().args(["campaign", "places", "--reason", "again"]).arg(&file))
             .arg("--plan")
             .arg(&text)
@@ -296,7 +303,7 @@ fn until_takes_fewer_minutes_than_the_plans_order() {
 fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("c.jrig");
-    let address: jointrig::device::address::Address = "sim:".parse().unwrap();
+    let address: Address = "sim:".parse().unwrap();
     run(&file, &short_contact_plan(), address.open(1).unwrap());
     let next = |until: &str| -> Value {
         let out =
@@ -328,6 +335,24 @@ fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
     // what no further hit reaches is refused before the hammer moves
     let (code, said) = goes_on("0.01%");
     assert!(code == Some(1) && said.contains("further hits"), "{code:?} {said}");
+    assert_eq!(hits(), struck);
+
+    // places that take seconds to be measured again gain more per minute than any hit
+    let again = |minutes: &str| {
+        let out = jointrig()
+            .args(["campaign", "next", "--json", "--again-min", minutes])
+            .arg(&file)
+            .output()
+            .unwrap();
+        serde_json::from_slice::<Value>(&out.stdout).unwrap()["again"].clone()
+    };
+    let halved: Vec<f64> =
+        again("10").as_array().unwrap().iter().map(|own| own["half_width"].as_f64().unwrap()).collect();
+    assert!(halved.is_sorted() && halved[0] < 0.98 * now, "{halved:?} {now}");
+    let wanted = format!("{:.6}%", 100.0 * (now - 0.3 * (now - limit)));
+    let out = run_until(&wanted).args(["--again-min", "0.001"]).output().unwrap();
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert!(out.status.code() == Some(1) && said.contains("campaign places"), "{said}");
     assert_eq!(hits(), struck);
 
     // what some further hits reach is measured
@@ -363,4 +388,20 @@ fn a_run_goes_on_until_the_interval_is_as_narrow_as_wanted() {
     // the same command measures nothing more, and the file is intact
     assert_eq!((goes_on(&percentage).0, hits()), (Some(0), after));
     verify();
+}
+
+#[test]
+fn b_alone_gets_all_its_hits_before_the_assembly_is_put_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, file) = (folder.path().join("plan.toml"), folder.path().join("c.jrig"));
+    std::fs::write(&plan, short_contact_plan().replace("wanted = 2", "wanted = 3")).unwrap();
+    done(jointrig().args(["campaign", "new"]).arg(&file).arg("--plan").arg(&plan));
+    done(jointrig().args(["campaign", "run", "--device", "sim:", "--yes", "--until", "99%"]).arg(&file));
+    let store = Store::open_read_only(&file).unwrap();
+    let (cells, good) = (store.cells().unwrap(), rows(&store));
+    for cell in &cells {
+        let hits = good.iter().filter(|own| own.cell == cell.id && own.verdict == Verdict::Good).count();
+        let wanted = if structure(cell.cell.configuration) == Structure::B { 3 } else { 2 };
+        assert_eq!(hits, wanted, "{:?}", cell.cell);
+    }
 }

@@ -24,22 +24,22 @@ fn a_place_that_is_measured_again_gives_the_right_stiffness() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("c.jrig");
     let right = one_second(CONTACT).replace("wanted = 6", "wanted = 2");
-    let told = "name = \"C3\", grouping = 5, position_m = [0.0, 0.001, -0.007]";
-    assert_eq!(right.matches(told).count(), 1);
+    let stated = "name = \"C3\", grouping = 5, position_m = [0.0, 0.001, -0.007]";
+    assert_eq!(right.matches(stated).count(), 1);
     let plan = |name: &str, text: &str| {
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
         path
     };
     let right_plan = plan("right.toml", &right);
-    let wrong = plan("wrong.toml", &right.replace(told, &told.replace("0.001", "0.003")));
+    let wrong = plan("wrong.toml", &right.replace(stated, &stated.replace("0.001", "0.003")));
     run(&file, &right, "sim:".parse::<jointrig::device::address::Address>().unwrap().open(1).unwrap());
     let k_t = |results: &Results| results.answer.as_ref().unwrap().contact.k_t_n_per_m.unwrap();
     let at_first = found(&file);
     assert!(at_first.source.measured_again.is_empty());
     let hits = rows(&Store::open_read_only(&file).unwrap()).len();
 
-    // 2 mm is more than this point's place is known to: it is told
+    // 2 mm is more than the stated uncertainty of this point's place: the report names it
     let said = done(&mut places(&file, &wrong));
     assert!(
         said.contains("geometry.response.C3.position_m: [0.0, 0.003, -0.007], was [0.0, 0.001, -0.007]"),

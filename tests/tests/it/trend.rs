@@ -222,7 +222,7 @@ fn errors_say_what_where_and_what_to_do() {
 }
 
 /// Campaigns in a series, and series of each kind.
-const LONG: usize = 20;
+const LENGTH: usize = 20;
 const SERIES: usize = 50;
 
 /// A bench whose places, gains and delays are the same in all campaigns, and not those of the plan:
@@ -258,11 +258,12 @@ fn bench() -> RigConfig {
 #[ignore = "docs/studies.md: how often a drift of 5 % is found in 20 simulated campaigns"]
 fn drifts_are_found_in_series_of_simulated_campaigns() {
     let one_of = count("EACH", 3) as usize;
-    let numbers: Vec<u64> = (0..(2 * LONG * one_of) as u64).collect();
-    // the first half is measured on a contact that is up to 5 % stiffer, the other half on one
+    let numbers: Vec<u64> = (0..(2 * LENGTH * one_of) as u64).collect();
+    // the first half is measured on a contact that becomes 5 % stiffer, the other half on one that
+    // stays as it is
     let drifted = |number: u64| {
-        let place = number as usize % (LONG * one_of) / one_of;
-        if (number as usize) < LONG * one_of { 0.05 * place as f64 / (LONG - 1) as f64 } else { 0.0 }
+        let place = number as usize % (LENGTH * one_of) / one_of;
+        if (number as usize) < LENGTH * one_of { 0.05 * place as f64 / (LENGTH - 1) as f64 } else { 0.0 }
     };
     let plan = one_second(CONTACT).replace("wanted = 6", "wanted = 2");
     let mut all = each(&numbers, |number| {
@@ -284,11 +285,11 @@ fn drifts_are_found_in_series_of_simulated_campaigns() {
     let folder = tempfile::tempdir().unwrap();
     let mut series = |drifting: bool| -> [bool; 2] {
         let mut drawn: Vec<usize> = Vec::new();
-        while drawn.len() < LONG {
+        while drawn.len() < LENGTH {
             let at = if drifting {
                 drawn.len() * one_of + random.random_range(0..one_of)
             } else {
-                LONG * one_of + random.random_range(0..LONG * one_of)
+                LENGTH * one_of + random.random_range(0..LENGTH * one_of)
             };
             if !drawn.contains(&at) {
                 drawn.push(at);
@@ -303,7 +304,7 @@ fn drifts_are_found_in_series_of_simulated_campaigns() {
             rows.push(format!("{day:02}.jrig,{day}"));
         }
         std::fs::write(folder.path().join("study.csv"), rows.join("\n")).unwrap();
-        let files = (0..LONG).map(|day| format!("{day:02}.json"));
+        let files = (0..LENGTH).map(|day| format!("{day:02}.json"));
         let words = ["--against", "day", "--table", "study.csv", "--json"];
         let out =
             jointrig().arg("trend").args(files).args(words).current_dir(folder.path()).output().unwrap();

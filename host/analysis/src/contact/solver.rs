@@ -311,15 +311,13 @@ impl Posterior<'_> {
             let cost = |value: f64| -> Result<f64, ContactError> {
                 let mut there = p.to_vec();
                 there[at] = value;
-                let bins = evaluate(self.blocks, &there, None)?;
-                let noise: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
-                Ok(self.prior(&there) + noise / self.shared)
+                Ok(self.cost(&there, &evaluate(self.blocks, &there, None)?))
             };
-            let stated = cost(p[at])?;
             let step = own.sigma / PER_SIGMA;
             let places: Vec<f64> = (-FAR..=FAR).map(|n| own.start + f64::from(n) * step).collect();
             let costs: Vec<f64> = places.iter().map(|place| cost(*place)).collect::<Result<_, _>>()?;
-            // at an end it may be smaller still
+            let stated = costs[FAR as usize];
+            // beyond an end it may be smaller still
             let inside = (1..costs.len() - 1).min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
             let Some(least) = inside.filter(|least| costs[*least] < MUCH_SMALLER * stated) else { continue };
             let bend = costs[least - 1] + costs[least + 1] - 2.0 * costs[least];
@@ -332,8 +330,12 @@ impl Posterior<'_> {
 
     fn place(&self, p: Vec<f64>, motion: &Motion) -> Result<SearchPoint, ContactError> {
         let bins = evaluate(self.blocks, &p, Some(motion))?;
+        Ok(SearchPoint { cost: self.cost(&p, &bins), p, bins })
+    }
+
+    fn cost(&self, p: &[f64], bins: &[Bin]) -> f64 {
         let noise: f64 = bins.iter().map(|bin| bin.normal.chi_square).sum();
-        Ok(SearchPoint { cost: self.prior(&p) + noise / self.shared, p, bins })
+        self.prior(p) + noise / self.shared
     }
 
     /// Minus the logarithm of the prior.
@@ -379,13 +381,13 @@ impl Posterior<'_> {
     }
 }
 
-/// Steps in a standard deviation, and in all to each side, in which a start of the contact's centre
-/// is looked for.
+/// The search for a start of the contact's centre: steps per standard deviation, and steps to each
+/// side of the stated place.
 const PER_SIGMA: f64 = 2.0;
 const FAR: i32 = 6;
 
-/// Part of the cost at the stated place, below which the search starts elsewhere: errors of other
-/// places and of what is stated of the specimens change it less.
+/// The search starts elsewhere if the cost there is below this part of that at the stated place.
+/// Errors of other places, or of what is stated of the specimens, lower it less.
 const MUCH_SMALLER: f64 = 0.1;
 
 fn distance_hz(blocks: &[Block]) -> f64 {

@@ -64,9 +64,7 @@ const MEASURED_AGAIN: &str = "measured_again";
 impl Store {
     /// Notes that the campaign continues on another structure, and the evidence for it.
     pub(crate) fn note_another_structure(&self, what: &str) -> Result<(), StoreError> {
-        let mut all = self.structure_changes()?;
-        all.push(format!("{}: {what}", utc_now()));
-        let text = serde_json::to_string(&all).map_err(|error| self.content(error.to_string()))?;
+        let text = self.with_sentence(STRUCTURES, what)?;
         self.set_meta(STRUCTURES, &text)?;
         self.log(&format!("another structure was accepted: {what}"))
     }
@@ -94,6 +92,13 @@ impl Store {
         Ok(self.meta(key)?.map(read).transpose()?.unwrap_or_default())
     }
 
+    /// The note with one more sentence, after the present time.
+    fn with_sentence(&self, key: &str, sentence: &str) -> Result<String, StoreError> {
+        let mut all = self.sentences(key)?;
+        all.push(format!("{}: {sentence}", utc_now()));
+        serde_json::to_string(&all).map_err(|error| self.content(error.to_string()))
+    }
+
     /// Takes over the plan in `text`, which errors call `source`, as far as it states places and
     /// what is known beforehand: they were measured again. Records and cells stay, and so do the
     /// earlier plans. Returns what is stated differently, a sentence each.
@@ -107,13 +112,12 @@ impl Store {
             source_name: source.into(),
             what,
         })?;
-        let mut all = self.measured_again()?;
-        all.push(format!("{}: {reason}: {}", utc_now(), changes.join("; ")));
-        let note = serde_json::to_string(&all).map_err(|error| self.content(error.to_string()))?;
+        let entry = format!("{reason}: {}", changes.join("; "));
+        let note = self.with_sentence(MEASURED_AGAIN, &entry)?;
         self.change("entering what was measured again", |connection| {
             write_plan(connection, text, source)?;
             write_meta(connection, MEASURED_AGAIN, &note)?;
-            write_log(connection, &format!("measured again ({source}): {reason}: {}", changes.join("; ")))
+            write_log(connection, &format!("measured again ({source}): {entry}"))
         })?;
         Ok(changes)
     }

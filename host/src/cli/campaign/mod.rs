@@ -1,4 +1,5 @@
-//! `campaign new | run | next | status | show | drop | keep | calibrate | places | check | verify | backup`.
+//! `campaign new | run | next | status | show | drop | keep | calibrate | places | check | verify |
+//! backup`.
 //!
 //! `campaign backup`: a verified copy, even while the campaign runs.
 //!
