@@ -45,13 +45,18 @@ struct Bench {
 
 impl Bench {
     fn new(cycles: u64) -> Self {
+        Self::with(cycles, "", "")
+    }
+
+    /// With more lines in the plan's [wear] and in the rig.
+    fn with(cycles: u64, of_run: &str, of_rig: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let rig = folder.path().join("rig.toml");
         let ([k, mu], [of_k, of_mu]) = (CHANGES, energies(cycles));
         let text = format!(
             "name = \"wears\"\n[contact]\nlaw = \"jenkins\"\nstiffness_n_per_m = [{K:e}, 2.6e8, {K:e}]\n\
              friction_coefficient = {MU}\nnormal_load_n = {LOAD_N}\n[contact.wear]\nstiffness_change = {k}\n\
-             stiffness_energy_j = {of_k}\nfriction_change = {mu}\nfriction_energy_j = {of_mu}\n[clamp]\nrigid = true\n"
+             stiffness_energy_j = {of_k}\nfriction_change = {mu}\nfriction_energy_j = {of_mu}\n[clamp]\nrigid = true\n{of_rig}"
         );
         std::fs::write(&rig, text).unwrap();
         let small = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/plans/small.toml");
@@ -59,7 +64,7 @@ impl Bench {
         let mut text = std::fs::read_to_string(small).unwrap();
         text = text.replace("[window]", &format!(
             "[wear]\nfrequency_hz = {HZ}\namplitude_m = {AMPLITUDE_M:e}\ncycles = {cycles}\nenergy_j = 1e6\n\
-             friction_coefficient = [0.1, 0.9]\nlargest_amplitude_m = 2e-5\n\n[window]"
+             friction_coefficient = [0.1, 0.9]\nlargest_amplitude_m = 2e-5\n{of_run}\n[window]"
         ));
         text = match text.find("\n[contact]\n") {
             Some(_) => text.replace("normal_load_n = 300.0", &format!("normal_load_n = {LOAD_N}")),
@@ -278,6 +283,21 @@ fn a_limit_or_the_user_ends_a_run_and_the_result_is_one_document() {
     let asked = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(asked.success());
     assert_eq!(child.wait().unwrap().code(), Some(1));
+    bench.verify();
+    let blocks = bench.blocks();
+    assert!(blocks.last().unwrap().drive_v < 0.1, "the last block ends at rest: {blocks:?}");
+}
+
+#[test]
+fn a_specimen_that_becomes_too_warm_ends_the_run() {
+    // 22 °C at first; over the limit after two seconds, which is less than the run
+    let bench = Bench::with(2_000, "temperature_c = 22.4\n", "[surroundings]\nwarming_k_per_s = 0.2\n");
+    let out = bench.wear(2_000).arg("--json").stdout(Stdio::piped()).output().unwrap();
+    assert!(out.status.success());
+    let found: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(found["end"], "temperature", "{found}");
+    let done = bench.done();
+    assert!(done > 50 && done < 1_500, "{done}");
     bench.verify();
     let blocks = bench.blocks();
     assert!(blocks.last().unwrap().drive_v < 0.1, "the last block ends at rest: {blocks:?}");

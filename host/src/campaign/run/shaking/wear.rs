@@ -213,7 +213,8 @@ pub fn run(
         ));
     }
     let Begun { plan, info, channels, session_id, epoch } = begin(store, session, &levels, onlookers)?;
-    let load = NormalLoad::new(&channels, options).map_err(|what| unfit(session, &what))?;
+    let load = NormalLoad::new(&channels, &options.run.normal_load, options.normal_load_n)
+        .map_err(|what| unfit(session, &what))?;
     let load_cells = plan.load_cells(&channels);
     let bench = Bench {
         session,
@@ -286,22 +287,21 @@ pub fn is_spaced(number: u64) -> bool {
 /// Where the normal load comes from.
 enum NormalLoad {
     Stated(Option<f64>),
-    /// Index in the scan, and N per code.
-    Measured(Vec<(usize, f64)>),
+    /// Indices of its channels in the scan.
+    Measured(Vec<usize>),
 }
 
 impl NormalLoad {
-    fn new(channels: &ChannelMap, options: &WearOptions) -> Result<Self, String> {
-        if options.run.normal_load.is_empty() {
-            return Ok(Self::Stated(options.normal_load_n));
+    fn new(channels: &ChannelMap, measured: &[String], stated_n: Option<f64>) -> Result<Self, String> {
+        if measured.is_empty() {
+            return Ok(Self::Stated(stated_n));
         }
         let place = |name: &String| {
             let mut all = channels.channels.iter();
             all.position(|channel| channel.name == name.as_str())
-                .map(|place| (place, 1.0))
                 .ok_or_else(|| format!("it has no channel `{name}` for the normal load (wear.normal_load)"))
         };
-        options.run.normal_load.iter().map(place).collect::<Result<_, _>>().map(Self::Measured)
+        measured.iter().map(place).collect::<Result<_, _>>().map(Self::Measured)
     }
 
     /// Its mean over these scans, N.
@@ -309,14 +309,12 @@ impl NormalLoad {
         match self {
             Self::Stated(load) => *load,
             Self::Measured(places) => {
-                let mean = |(place, factor): &(usize, f64)| {
+                let mean = |place: &usize| {
                     let own = samples.channel(*place).part(scans.start, scans.end);
-                    let mut values = Vec::new();
-                    let units = own.of().units(&channels.channels[*place]);
-                    own.scaled(factor * units, &mut values);
-                    values.iter().sum::<f64>() / values.len().max(1) as f64
+                    Some(own.of().units(&channels.channels[*place]) * own.mean()?)
                 };
-                Some(places.iter().map(mean).sum::<f64>().abs())
+                // pressed together it may have either sign
+                Some(places.iter().map(mean).sum::<Option<f64>>()?.abs())
             }
         }
     }
@@ -671,6 +669,43 @@ impl Run<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use jointrig_protocol::channel::{Channel, Quantity, Role};
+
+    #[test]
+    fn the_normal_load_is_the_sum_of_its_channels_over_a_cycle() {
+        let channel = |name: &str, units_per_volt: f32| Channel {
+            name: name.parse().expect("a short name"),
+            role: Role::Auxiliary,
+            quantity: Quantity::Force,
+            units_per_volt,
+            range_v: 10.0,
+            delay_ns: 0,
+            bits: 16,
+        };
+        let channels = ChannelMap {
+            id: 0,
+            rate_hz: 51_200,
+            exact_hz: None,
+            channels: vec![channel("n_1", 40.0), channel("t", 20.0), channel("n_2", -20.0)],
+        };
+        // per code 400/32768 N and -200/32768 N; in the cycle (scans 1 to 4) means of 8192 codes
+        let n_1 = [0, 8192 + 300, 8192 - 300, 8192, 8192, 0];
+        let n_2 = [7, 8192, 8192 + 50, 8192 - 50, 8192, 7];
+        let codes = [n_1, [9000; 6], n_2].concat();
+        let samples = Samples::of_codes(&codes, 3);
+        let of = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            NormalLoad::new(&channels, &names, Some(300.0))
+        };
+        let over = |load: NormalLoad| load.over(&channels, &samples, 1..5);
+        assert_eq!(over(of(&["n_1"]).expect("a channel")), Some(100.0));
+        // pressure counts with either sign
+        assert_eq!(over(of(&["n_2"]).expect("a channel")), Some(50.0));
+        assert_eq!(over(of(&["n_1", "n_2"]).expect("channels")), Some(50.0));
+        assert_eq!(over(of(&[]).expect("none")), Some(300.0));
+        let refused = of(&["n_3"]).err().expect("no such channel");
+        assert!(refused.contains("`n_3`") && refused.contains("wear.normal_load"), "{refused}");
+    }
 
     #[test]
     fn ten_loops_of_each_decade_are_kept() {
