@@ -86,27 +86,32 @@ pub struct TrendArgs {
     json: bool,
 }
 
-/// Where a quantity is in results.json.
-fn place_of(quantity: StudiedQuantity, results: &Value) -> Option<&Value> {
+/// Mean and interval of a value in results.json.
+fn with_interval(value: &Value) -> (&Value, &Value) {
+    (&value["mean"], &value["ci95"])
+}
+
+/// A quantity in results.json, and the ends of its interval (null if it has none).
+fn place_of(quantity: StudiedQuantity, results: &Value) -> Option<(&Value, &Value)> {
     let rows = |at: &str| results.pointer(at).and_then(Value::as_array).into_iter().flatten();
     let found = match quantity {
-        StudiedQuantity::KT => results.pointer("/answer/contact/k_t_n_per_m"),
-        StudiedQuantity::CT => results.pointer("/answer/contact/c_t_n_s_per_m"),
-        StudiedQuantity::BetweenArms => results.pointer("/answer/between_arms/k_n_per_m"),
+        StudiedQuantity::KT => results.pointer("/answer/contact/k_t_n_per_m").map(with_interval),
+        StudiedQuantity::CT => results.pointer("/answer/contact/c_t_n_s_per_m").map(with_interval),
+        StudiedQuantity::BetweenArms => results.pointer("/answer/between_arms/k_n_per_m").map(with_interval),
         StudiedQuantity::FrictionCoefficient => {
             let slips = |row: &&Value| row["friction_coefficient"].is_number();
             let amplitude = |row: &&Value| row["amplitude_m"].as_f64().unwrap_or(0.0);
             rows("/hysteresis")
                 .filter(slips)
                 .max_by(|a, b| amplitude(a).total_cmp(&amplitude(b)))
-                .map(|row| &row["friction_coefficient"])
+                .map(|row| (&row["friction_coefficient"], &row["friction_coefficient_ci95"]))
         }
         // they are sorted by frequency
         StudiedQuantity::FirstMode => rows("/modes")
             .find(|row| row["structure"].as_str() == Some(Structure::Ajb.name()))
-            .map(|row| &row["frequency_hz"]),
+            .map(|row| with_interval(&row["frequency_hz"])),
     };
-    found.filter(|value| !value.is_null())
+    found.filter(|(value, _)| !value.is_null())
 }
 
 impl TrendArgs {
@@ -165,7 +170,7 @@ impl TrendArgs {
         table: Option<&StudyTable>,
     ) -> Result<FoundByCampaign, String> {
         let (symbol, ..) = shown_as(self.of);
-        let Some(found) = place_of(self.of, results) else {
+        let Some((value, ends)) = place_of(self.of, results) else {
             let why = match self.of {
                 StudiedQuantity::FrictionCoefficient => {
                     "no level of the shaker slips, or the plan states no normal load"
@@ -175,14 +180,11 @@ impl TrendArgs {
             };
             return Err(format!("it has no {symbol}: {why}"));
         };
-        let number = |at: &str| found.pointer(at).and_then(Value::as_f64);
-        // a plain number has no interval of its own: its error counts as scatter
-        let exact = found.as_f64();
-        let value = match [
-            number("/mean").or(exact),
-            number("/ci95/0").or(exact),
-            number("/ci95/1").or(exact),
-        ] {
+        // the error of a loop with fewer than four cycles, which has no interval, counts as scatter
+        let only =
+            value.as_f64().filter(|_| ends.is_null() && self.of == StudiedQuantity::FrictionCoefficient);
+        let end = |at: usize| ends[at].as_f64().or(only);
+        let value = match [value.as_f64(), end(0), end(1)] {
             [Some(mean), Some(low), Some(high)] if low > 0.0 && mean > 0.0 && high.is_finite() => {
                 Interval { mean, ci95: [low, high] }
             }

@@ -169,8 +169,12 @@ pub struct LoopAnalysis {
     pub k_fundamental_n_per_m: Option<Complex<f64>>,
     /// μN from the plateau's median, N; only in gross slip.
     pub friction_limit_n: Option<f64>,
+    /// 95 % interval of μN from its scatter over the cycles, N; `None` for fewer than four.
+    pub friction_limit_ci95_n: Option<[f64; 2]>,
     /// μ; only if the normal load is known.
     pub friction_coefficient: Option<f64>,
+    /// 95 % interval of μ for a normal load without error; `None` for fewer than four cycles.
+    pub friction_coefficient_ci95: Option<[f64; 2]>,
     /// Phase by which Δx lags T at the fundamental, degrees.
     pub phase_deg: f64,
     /// Δx of the loop for plotting, m: the averaged cycle, or the first cycles of a decay.

@@ -489,6 +489,14 @@ impl SteadyRecord<'_> {
             findings.push(LoopFinding::UnevenLoad { change: plateaus.change, std: plateaus.std });
             friction_limit_n = Some(plateaus.limit_n);
         }
+        let friction_limit_ci95_n = friction_limit_n.and_then(|limit| {
+            let of_cycle = |cycle: &Cycle| friction_limit(&repair.friction(cycle), &strokes);
+            let values: Vec<f64> = cycles.each(force, summed, of_cycle).into_iter().flatten().collect();
+            let over = widened(OverCycles::of(&values)?, friction_limit(mean, &strokes), repair.unsure());
+            // of the averaged loop the medians are less noisy than those of single cycles
+            Some(over.ci95?.map(|end| limit + end - over.mean))
+        });
+        let of_load = |force_n: f64| record.normal_load_n.map(|load_n| force_n / load_n);
         let shown = repair.in_step(mean);
         LoopAnalysis {
             kind: Kind::Shaker,
@@ -504,9 +512,10 @@ impl SteadyRecord<'_> {
             k_secant_n_per_m: Some(secant_stiffness(&shown)),
             k_fundamental_n_per_m: Some(fundamental_stiffness(&shown)),
             friction_limit_n,
-            friction_coefficient: friction_limit_n
-                .zip(record.normal_load_n)
-                .map(|(limit, load)| limit / load),
+            friction_limit_ci95_n,
+            friction_coefficient: friction_limit_n.and_then(of_load),
+            friction_coefficient_ci95: friction_limit_ci95_n
+                .and_then(|[low, high]| Some([of_load(low)?, of_load(high)?])),
             phase_deg: evidence.phase_deg,
             loop_displacement_m: mean.displacement_m.clone(),
             loop_force_n: mean.force_n.clone(),

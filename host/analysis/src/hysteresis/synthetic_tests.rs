@@ -3,6 +3,9 @@
 
 use super::*;
 use proptest::prelude::*;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
 const FS: f64 = 51_200.0;
@@ -196,4 +199,32 @@ fn broken_records_are_refused_with_the_reason() {
         }),
         HysteresisError::NoMotion
     ));
+}
+
+/// The friction of each cycle differs by 1 %, as a contact's does, and the force has noise of 2 %:
+/// the interval of the mean over the cycles has the coverage that it states.
+#[test]
+fn the_interval_of_the_friction_limit_covers_as_stated() {
+    let (k, limit, frequency_hz) = (150e6, 180.0, 80.0);
+    let per_cycle = (FS / frequency_hz) as usize;
+    let mut covered = 0;
+    for seed in 0..200 {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(70_000 + seed);
+        let mut noise = |sigma: f64| {
+            let one: f64 = StandardNormal.sample(&mut rng);
+            sigma * one
+        };
+        let mut record = record(&[(k, limit)], 4.0 * limit / k, frequency_hz, 0.0);
+        let scales: Vec<f64> = (0..9).map(|_| 1.0 + noise(0.01)).collect();
+        for (i, force) in record.force_n.iter_mut().enumerate() {
+            *force = *force * scales[i / per_cycle] + noise(0.02 * limit);
+        }
+        let got = analyse(&record).expect("a loop");
+        let [low, high] = got.friction_limit_ci95_n.expect("eight cycles");
+        let [mu_low, mu_high] = got.friction_coefficient_ci95.expect("a load");
+        assert!((mu_low * 300.0 / low - 1.0).abs() < 1e-12 && (mu_high * 300.0 / high - 1.0).abs() < 1e-12);
+        covered += usize::from(low <= limit && limit <= high);
+    }
+    // 95 % of 200, ± 3 standard deviations
+    assert!((181..=199).contains(&covered), "{covered} of 200");
 }

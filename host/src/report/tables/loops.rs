@@ -4,7 +4,7 @@
 use super::{HtmlTable, number, remarks, scattered, words};
 use crate::report::html::escaped;
 use crate::report::words as said;
-use crate::report::words::number::{decimals, micro, short, with_scatter};
+use crate::report::words::number::{decimals, micro, short, with_ends, with_scatter};
 use crate::results::{Excitation, Force, Hysteresis, OverCycles, Results, Shape};
 use std::fmt::Write;
 
@@ -133,7 +133,13 @@ pub fn hysteresis(results: &Results) -> Option<String> {
             ),
         ];
         if friction {
-            cells.push(number(h.friction_coefficient.map(short), at("friction_coefficient")));
+            let mu = h
+                .friction_coefficient
+                .map(|mu| h.friction_coefficient_ci95.map_or_else(|| short(mu), |ends| with_ends(mu, ends)));
+            let ends = h
+                .friction_coefficient_ci95
+                .map_or_else(String::new, |_| format!(" {0}/0 {0}/1", at("friction_coefficient_ci95")));
+            cells.push(number(mu, at("friction_coefficient") + &ends));
         }
         if h.force == Force::Corrected {
             corrected.row(cells);

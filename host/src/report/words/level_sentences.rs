@@ -3,7 +3,7 @@
 //! loop, and its faults.
 
 use super::names::{BETWEEN_SPOTS, shape_name};
-use super::number::{decimals, prefixed, short, stiffness};
+use super::number::{decimals, prefixed, short, stiffness, with_ends};
 use super::warning_sentences::loop_finding;
 use crate::analyse::NoLevelStiffness;
 use crate::contact::Shares;
@@ -104,11 +104,14 @@ fn of_row(row: &Hysteresis, beside: bool) -> Vec<String> {
         ));
     }
     if let Some(limit) = row.friction_limit_n {
-        let coefficient = row
-            .friction_coefficient
-            .map_or("no coefficient μ without a normal load (--normal-load N)".to_owned(), |mu| {
-                format!("coefficient μ = {}", short(mu))
-            });
+        let coefficient = row.friction_coefficient.map_or(
+            "no coefficient μ without a normal load (--normal-load N)".to_owned(),
+            |mu| {
+                let shown =
+                    row.friction_coefficient_ci95.map_or_else(|| short(mu), |ends| with_ends(mu, ends));
+                format!("coefficient μ = {shown}")
+            },
+        );
         lines.push(format!("  friction limit μN: {}; {coefficient}", prefixed(limit, "N")));
     }
     if let Some(phase) = row.phase_deg {

@@ -30,6 +30,12 @@ pub fn to_its_interval(mean: f64, half: f64) -> String {
     format!("{} ± {}", decimals(mean, places), decimals(half, places))
 }
 
+/// `mean (low…high)`, with the decimals that show two digits of half the interval.
+pub fn with_ends(mean: f64, [low, high]: [f64; 2]) -> String {
+    let [mean, low, high] = [mean, low, high].map(|of| decimals(of, interval_places(0.5 * (high - low))));
+    format!("{mean} ({low}…{high})")
+}
+
 /// A stiffness in N/m, shown in N/µm without the unit.
 pub fn micro(stiffness_n_per_m: f64) -> f64 {
     stiffness_n_per_m * 1e-6
@@ -160,6 +166,12 @@ mod tests {
         assert_eq!(prefixed(-1.6e-3, "J"), "−1.60 mJ");
         assert_eq!(prefixed(0.0, "J"), "0.00 J");
         assert_eq!(length(3.0e-3, 2e-6), "3.000 ± 0.002 mm");
+    }
+
+    #[test]
+    fn the_ends_of_an_interval_can_be_told_from_its_mean() {
+        assert_eq!(with_ends(0.6, [0.5998, 0.6002]), "0.60000 (0.59980…0.60020)");
+        assert_eq!(with_ends(0.41, [0.2, 0.6]), "0.41 (0.20…0.60)");
     }
 
     #[test]
