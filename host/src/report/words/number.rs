@@ -30,9 +30,12 @@ pub fn to_its_interval(mean: f64, half: f64) -> String {
     format!("{} ± {}", decimals(mean, places), decimals(half, places))
 }
 
-/// `mean (low…high)`, with the decimals that show two digits of half the interval.
+/// `mean (low…high)`, with the decimals that show two digits of half the interval; as [`short`]
+/// where it has no width.
 pub fn with_ends(mean: f64, [low, high]: [f64; 2]) -> String {
-    let [mean, low, high] = [mean, low, high].map(|of| decimals(of, interval_places(0.5 * (high - low))));
+    let half = 0.5 * (high - low);
+    let digits = if half > 0.0 { interval_places(half) } else { places(mean, 3) };
+    let [mean, low, high] = [mean, low, high].map(|of| decimals(of, digits));
     format!("{mean} ({low}…{high})")
 }
 
@@ -172,6 +175,7 @@ mod tests {
     fn the_ends_of_an_interval_can_be_told_from_its_mean() {
         assert_eq!(with_ends(0.6, [0.5998, 0.6002]), "0.60000 (0.59980…0.60020)");
         assert_eq!(with_ends(0.41, [0.2, 0.6]), "0.41 (0.20…0.60)");
+        assert_eq!(with_ends(0.4, [0.4, 0.4]), "0.400 (0.400…0.400)");
     }
 
     #[test]
