@@ -313,7 +313,7 @@ impl NormalLoad {
                     let own = samples.channel(*place).part(scans.start, scans.end);
                     Some(own.of().units(&channels.channels[*place]) * own.mean()?)
                 };
-                // pressed together it may have either sign
+                // a sensor may show pressure with either sign
                 Some(places.iter().map(mean).sum::<Option<f64>>()?.abs())
             }
         }
