@@ -73,7 +73,8 @@ pub struct Hysteresis {
     pub friction_limit_ci95_n: Option<[f64; 2]>,
     /// Friction limit over normal load; null if the contact did not slip or the load is not known.
     pub friction_coefficient: Option<f64>,
-    /// The same over the normal load, which counts as exact.
+    /// The same over the normal load. Gains and the load count as exact: it is no interval of μ
+    /// itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_coefficient_ci95: Option<[f64; 2]>,
     /// Phase by which Δx lags T, degrees; for impacts over the first cycle, mean over hits.

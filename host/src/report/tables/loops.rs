@@ -95,7 +95,7 @@ pub fn hysteresis(results: &Results) -> Option<String> {
     let friction = results.hysteresis.iter().any(|h| h.friction_coefficient.is_some());
     let mut heads = HEADS.to_vec();
     if friction {
-        heads.push("μ");
+        heads.push("μ (95 % over the cycles)");
     }
     let mut table = HtmlTable::new(2, "Loops with the raw force (the paper's Table 3)", &heads);
     let mut corrected = HtmlTable::new(2, "Loops with the corrected force", &heads);

@@ -109,7 +109,9 @@ fn of_row(row: &Hysteresis, beside: bool) -> Vec<String> {
             |mu| {
                 let shown =
                     row.friction_coefficient_ci95.map_or_else(|| short(mu), |ends| with_ends(mu, ends));
-                format!("coefficient μ = {shown}")
+                let of_what =
+                    row.friction_coefficient_ci95.map_or("", |_| ", of the scatter over the cycles alone");
+                format!("coefficient μ = {shown}{of_what}")
             },
         );
         lines.push(format!("  friction limit μN: {}; {coefficient}", prefixed(limit, "N")));
