@@ -293,8 +293,8 @@ impl Outlook {
     }
 
     /// Whether ever more hits in the cells of one structure, or in all, could make the half width
-    /// this small. More hits also locate the places better, so the variance is no straight line over
-    /// 1/hits: extrapolating one would give up too early.
+    /// this small. More hits also locate the places better, so the variance is no straight line
+    /// over 1/hits: extrapolating one would give up too early.
     pub fn within_reach(&self, until: f64, of: Option<Structure>) -> bool {
         let all = |cell: &ForecastCell| of.is_none_or(|of| cell.structure == of);
         self.forecast.half_width_with_hits(EVER, all) <= until

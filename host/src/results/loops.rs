@@ -68,7 +68,8 @@ pub struct Hysteresis {
     /// Friction limit μN from the plateau's median, N; only in gross slip.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_limit_n: Option<f64>,
-    /// 95 % interval of the friction limit from its scatter over the cycles, N; from four cycles on.
+    /// 95 % interval of the friction limit from its scatter over the cycles, N; from four cycles
+    /// on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_limit_ci95_n: Option<[f64; 2]>,
     /// Friction limit over normal load; null if the contact did not slip or the load is not known.

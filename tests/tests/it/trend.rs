@@ -169,7 +169,7 @@ fn the_first_mode_and_the_coefficient_of_friction_have_trends_too() {
     assert_eq!(mode["campaigns"][0]["value"]["mean"], json!(200.0));
     let friction = found(folder.path(), &["--of", "friction-coefficient"]);
     let [level, low, high] = interval(&friction["level"]);
-    // its own error is not known: the scatter of the campaigns is all that widens the level
+    // every other campaign states no error of its own: it counts as scatter
     assert!((level - 0.57).abs() < 0.01 && 0.54 < low && high < 0.6, "{friction}");
     assert_eq!(friction["campaigns"][3]["own_std"], json!(0.0));
     let known = friction["campaigns"][4]["own_std"].as_f64().unwrap();
