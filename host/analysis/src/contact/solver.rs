@@ -64,6 +64,7 @@ pub struct Solution {
 }
 
 /// A point of the search.
+#[derive(Clone)]
 struct SearchPoint {
     p: Vec<f64>,
     bins: Vec<Bin>,
@@ -114,18 +115,23 @@ pub fn solve(
     Posterior { blocks, parameters, shared }.centre(&mut from)?;
     let searched: Vec<Result<Minimum, ContactError>> =
         starts.par_iter().map(|start| search(blocks, parameters, &from, start, shared)).collect();
-    let reached: Vec<(f64, Vec<f64>)> =
-        searched.iter().flatten().map(|found| (found.cost, found.place.p.clone())).collect();
-    let mut refused = None;
-    let mut best: Option<Minimum> = None;
-    for found in searched {
-        match found {
-            Ok(found) if best.as_ref().is_none_or(|best| found.cost < best.cost) => best = Some(found),
-            Ok(_) => {}
+    let (mut found, mut refused) = (Vec::new(), None);
+    for search in searched {
+        match search {
+            Ok(minimum) => found.push(minimum),
             Err(error) => refused = Some(refused.unwrap_or(error)),
         }
     }
-    let Minimum { blocks, place: here, cost } = best.ok_or_else(|| refused.unwrap_or_else(not_converged))?;
+    let first = lowest(&found).ok_or_else(|| refused.unwrap_or_else(not_converged))?;
+    // a side from which no minimum is reached has none to offer
+    let beside: Vec<Minimum> = [-BESIDE, BESIDE]
+        .par_iter()
+        .filter_map(|sigmas| search_beside(first, parameters, *sigmas, shared).ok())
+        .collect();
+    found.extend(beside);
+    let reached: Vec<(f64, Vec<f64>)> =
+        found.iter().map(|found| (found.cost, found.place.p.clone())).collect();
+    let Minimum { blocks, place: here, cost } = lowest(&found).ok_or_else(not_converged)?.clone();
     let (information, _) = Posterior { blocks: &blocks, parameters, shared }.normal(&here);
     let mut certainty = certainty(&blocks, &here.bins, &here.p, &information, shared)?;
     if let Some((weight, way)) = other_minimum(cost, &here.p, &reached) {
@@ -149,7 +155,13 @@ fn other_minimum(cost: f64, p: &[f64], reached: &[(f64, Vec<f64>)]) -> Option<(f
     all.max_by(|a, b| effect(a).total_cmp(&effect(b)))
 }
 
+/// The minimum with the smallest cost.
+fn lowest(found: &[Minimum]) -> Option<&Minimum> {
+    found.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
 /// The end of a search, with its noise.
+#[derive(Clone)]
 struct Minimum {
     blocks: Vec<Block>,
     place: SearchPoint,
@@ -169,7 +181,7 @@ fn search(
     start: &Start,
     shared: f64,
 ) -> Result<Minimum, ContactError> {
-    let mut blocks = blocks.to_vec();
+    let blocks = blocks.to_vec();
     let (mut searched, mut p) = (parameters.clone(), from.to_vec());
     for (at, value) in &start.held {
         searched.hold(*at, *value);
@@ -184,6 +196,47 @@ fn search(
         let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
         (here, settled) = posterior.settle(here.p, motion, Widening::ToCome)?;
     }
+    widened(blocks, parameters, &searched, (here, settled), shared)
+}
+
+/// Distance, in standard deviations of the compliance, from which [`search_beside`] begins.
+const BESIDE: f64 = 2.0;
+
+/// Searches for a lower minimum beside `found`: the compliance is held `sigmas` standard deviations
+/// away while all others are fitted, and then released. On few rigs, a search ends in a local
+/// minimum from which a way of other parameters, at equal cost, leads beyond the interval; held
+/// there, they find it.
+fn search_beside(
+    found: &Minimum,
+    parameters: &Parameters,
+    sigmas: f64,
+    shared: f64,
+) -> Result<Minimum, ContactError> {
+    let blocks = found.blocks.clone();
+    let whole = Posterior { blocks: &blocks, parameters, shared };
+    let (information, gradient) = whole.normal(&found.place);
+    let (_, sigma) = newton(&information, &gradient, HARDLY_DAMPED)?;
+    let mut p = found.place.p.clone();
+    p[COMPLIANCE] += sigmas * sigma;
+    let mut held = parameters.clone();
+    held.hold(COMPLIANCE, p[COMPLIANCE]);
+    let motion = motions(&blocks, &found.place.bins);
+    let (there, _) =
+        Posterior { blocks: &blocks, parameters: &held, shared }.settle(p, motion, Widening::Begun)?;
+    let motion = motions(&blocks, &there.bins);
+    let end = whole.settle(there.p, motion, Widening::Begun)?;
+    widened(blocks, parameters, parameters, end, shared)
+}
+
+/// Widens the noise by what the end of a search leaves, and searches on from there.
+fn widened(
+    mut blocks: Vec<Block>,
+    parameters: &Parameters,
+    searched: &Parameters,
+    end: (SearchPoint, bool),
+    shared: f64,
+) -> Result<Minimum, ContactError> {
+    let (mut here, mut settled) = end;
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
@@ -192,7 +245,7 @@ fn search(
             break;
         }
         let motion = motions(&blocks, &here.bins);
-        let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
+        let posterior = Posterior { blocks: &blocks, parameters: searched, shared };
         (here, settled) = posterior.settle(here.p, motion, Widening::Begun)?;
     }
     if !settled {
@@ -264,6 +317,7 @@ impl Posterior<'_> {
         let mut stale = true;
         let mut damping = 1e-9;
         let mut at_rest = 0;
+        let held = self.parameters.all()[COMPLIANCE].sigma == 0.0;
         let mut costs = Vec::new();
         for step in 0..STEPS {
             costs.push(here.cost);
@@ -275,7 +329,7 @@ impl Posterior<'_> {
             let (step, sigma) = newton(&information, &gradient, damping)?;
             if damping <= HARDLY_DAMPED && step[COMPLIANCE].abs() <= SETTLED * sigma {
                 at_rest += 1;
-                if -0.5 * gradient.dot(&step) <= SETTLED || at_rest >= AT_REST {
+                if -0.5 * gradient.dot(&step) <= SETTLED || (at_rest >= AT_REST && !held) {
                     return Ok((here, true));
                 }
             } else {
