@@ -151,9 +151,13 @@ fn other_minimum(cost: f64, p: &[f64], reached: &[(f64, Vec<f64>)]) -> Option<(f
         ((1.0 + (other - cost).exp()).recip(), way)
     };
     let effect = |(weight, way): &(f64, DVector<f64>)| weight * way[COMPLIANCE].powi(2);
-    let all = reached.iter().map(of).filter(|one| effect(one) > 0.0);
+    let all = reached.iter().map(of).filter(|one| one.0 > IMPROBABLE && effect(one) > 0.0);
     all.max_by(|a, b| effect(a).total_cmp(&effect(b)))
 }
+
+/// A minimum where the truth is with a smaller probability than this is not allowed for: however far
+/// away it is, an interval of 95 % need not contain it.
+const IMPROBABLE: f64 = 1e-3;
 
 /// The minimum with the smallest cost.
 fn lowest(found: &[Minimum]) -> Option<&Minimum> {
@@ -816,6 +820,8 @@ mod tests {
         let all = [(5.0, place(1.0)), (5.0, place(1.5)), (35.0, place(3.0))];
         let (weight, way) = other_minimum(5.0, &here, &all).expect("another minimum");
         assert_eq!((weight, way.as_slice()), (0.5, [0.5, 1.5].as_slice()));
+        // so unlikely that it does not count, although it is very far
+        assert_eq!(other_minimum(5.0, &here, &[(5.0, place(1.0)), (45.0, place(1e15))]), None);
         // e times less likely
         let (weight, _) = other_minimum(5.0, &here, &[(6.0, place(1.5))]).expect("another minimum");
         assert!((weight - 1.0 / (1.0 + 1.0_f64.exp())).abs() < 1e-12, "{weight}");
