@@ -131,7 +131,7 @@ pub fn solve(
     found.extend(beside);
     let reached: Vec<(f64, Vec<f64>)> =
         found.iter().map(|found| (found.cost, found.place.p.clone())).collect();
-    let Minimum { blocks, place: here, cost } = lowest(&found).ok_or_else(not_converged)?.clone();
+    let Minimum { blocks, place: here, cost, .. } = lowest(&found).ok_or_else(not_converged)?.clone();
     let (information, _) = Posterior { blocks: &blocks, parameters, shared }.normal(&here);
     let mut certainty = certainty(&blocks, &here.bins, &here.p, &information, shared)?;
     if let Some((weight, way)) = other_minimum(cost, &here.p, &reached) {
@@ -169,6 +169,8 @@ fn lowest(found: &[Minimum]) -> Option<&Minimum> {
 struct Minimum {
     blocks: Vec<Block>,
     place: SearchPoint,
+    /// The parameters with those held that the search holds to its end.
+    searched: Parameters,
     /// Minus the logarithm of the posterior. Searches end with different noise, so that it contains
     /// the noise's normalisation.
     cost: f64,
@@ -207,9 +209,9 @@ fn search(
 const BESIDE: f64 = 2.0;
 
 /// Searches for a lower minimum beside `found`: the compliance is held `sigmas` standard deviations
-/// away while all others are fitted, and then released. On few rigs, a search ends in a local
-/// minimum from which a way of other parameters, at equal cost, leads beyond the interval; held
-/// there, they find it.
+/// away while all others are fitted, and then released. What the search to `found` held stays held.
+/// On few rigs, a search ends in a local minimum from which a way of other parameters, at equal
+/// cost, leads beyond the interval; held there, they find it.
 fn search_beside(
     found: &Minimum,
     parameters: &Parameters,
@@ -217,19 +219,19 @@ fn search_beside(
     shared: f64,
 ) -> Result<Minimum, ContactError> {
     let blocks = found.blocks.clone();
-    let whole = Posterior { blocks: &blocks, parameters, shared };
+    let whole = Posterior { blocks: &blocks, parameters: &found.searched, shared };
     let (information, gradient) = whole.normal(&found.place);
     let (_, sigma) = newton(&information, &gradient, HARDLY_DAMPED)?;
     let mut p = found.place.p.clone();
     p[COMPLIANCE] += sigmas * sigma;
-    let mut held = parameters.clone();
+    let mut held = found.searched.clone();
     held.hold(COMPLIANCE, p[COMPLIANCE]);
     let motion = motions(&blocks, &found.place.bins);
     let (there, _) =
         Posterior { blocks: &blocks, parameters: &held, shared }.settle(p, motion, Widening::Begun)?;
     let motion = motions(&blocks, &there.bins);
     let end = whole.settle(there.p, motion, Widening::Begun)?;
-    widened(blocks, parameters, parameters, end, shared)
+    widened(blocks, parameters, &found.searched, end, shared)
 }
 
 /// Widens the noise by what the end of a search leaves, and searches on from there.
@@ -258,7 +260,7 @@ fn widened(
     let noise: f64 = here.bins.iter().map(|bin| normalisation(&blocks[bin.block], bin)).sum();
     let cost = Posterior { blocks: &blocks, parameters, shared }.prior(&here.p)
         + (here.bins.iter().map(|bin| bin.normal.chi_square).sum::<f64>() + noise) / shared;
-    Ok(Minimum { blocks, place: here, cost })
+    Ok(Minimum { blocks, place: here, searched: searched.clone(), cost })
 }
 
 /// Logarithm by which counting more noise than measured lowers the likelihood of a bin: that of its
