@@ -73,7 +73,6 @@ pub fn short_contact_plan() -> String {
     let mut text = without_known_mass(&one_second(CONTACT));
     for (old, new) in [
         ("[[configuration]]\nname = \"AJB\"\nimpacts = [\"OPEN\"]\nresponses = [\"OPEN\"]\n", ""),
-        ("[[configuration]]\nname = \"AJB\"\nimpacts = [\"OPEN_B\"]\nresponses = [\"OPEN_B\"]\n", ""),
         ("[[configuration]]\nname = \"AJB\"\nimpacts = [\"AZ3\"]\nresponses = [\"A3\"]\n", ""),
         ("\"BZ3\", \"BY1\", \"BY2\", \"BY3\", \"BX1\", \"BX2\", \"BX3\"]", "\"BZ3\"]"),
         ("impacts = [\"AZ1\", \"AZ2\", \"AZ3\"]", "impacts = [\"AZ1\", \"AZ3\"]"),

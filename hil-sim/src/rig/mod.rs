@@ -22,7 +22,7 @@
 //! record takes about as long as with rigid bodies; while the shaker drives, twice as long.
 
 use channels::{EXCITATION, FIRST_SIGNAL, FORCE};
-use config::{BodyName, OpenJoint};
+use config::BodyName;
 use force::ForceSegment;
 use key::stream;
 use plant::Plant;
@@ -263,11 +263,11 @@ impl Rig {
         if hit.body != seen.body && on_known_mass {
             return Err(RigError::ApartFromKnownMass { impact: impact.into(), response: response.into() });
         }
-        let of_open = self.config.open_joint_in(configuration).into_iter().flat_map(OpenJoint::points);
-        let opens: Vec<[bool; 2]> =
-            of_open.map(|(hit, seen)| [hit.name == impact, seen.name == response]).collect();
-        let opened = opens.contains(&[true; 2]);
-        if !opened && opens.iter().flatten().any(|own| *own) {
+        let opens = self
+            .config
+            .open_joint_in(configuration)
+            .map_or([false; 2], |open| [open.impact.name == impact, open.response.name == response]);
+        if opens[0] != opens[1] {
             return Err(RigError::HalfOpen { impact: impact.into(), response: response.into() });
         }
         let mark = self.config.spots.mark.as_ref();
@@ -278,7 +278,7 @@ impl Rig {
         let worn_j = self.worn_j();
         let drifted_to = (self.total_hits, self.total_scans);
         let changes = self.config.contact.drifts() || self.config.contact.wear.is_some();
-        let open = self.open.as_ref().filter(|_| opened);
+        let open = self.open.as_ref().filter(|_| opens[0]);
         let changed = (configuration == Configuration::Ajb && changes && open.is_none())
             .then(|| Box::new(self.config_after(drifted_to, worn_j)));
         let config = changed.as_deref().or(open.map(|(config, _)| &**config)).unwrap_or(&self.config);
@@ -537,9 +537,8 @@ impl Rig {
 
     /// The assembly with its joint open, if that is staged.
     fn open(&self) -> Option<&(Box<RigConfig>, Plant)> {
-        let mut points =
-            self.config.open_joint_in(self.configuration).into_iter().flat_map(OpenJoint::points);
-        self.open.as_ref().filter(|_| points.any(|(hit, _)| hit.name == self.impact))
+        let of_impact = self.config.open_joint_in(self.configuration).map(|open| &open.impact.name);
+        self.open.as_ref().filter(|_| of_impact == Some(&self.impact))
     }
 
     /// What is stepped: the known mass if it is struck, the assembly with its joint open, else the
@@ -611,10 +610,9 @@ pub enum RigError {
         /// The response.
         response: String,
     },
-    /// Hammer and vibrometer are not at points of the open joint that belong together.
+    /// One of hammer and vibrometer is to be at its point of the open joint, the other not.
     #[error(
-        "impact {impact} and response {response}: points of the open joint are used in pairs, both on side A or both on side B, \
-         since the joint is either open or closed"
+        "impact {impact} and response {response}: only one of them is a point of the open joint; the joint is either open or closed"
     )]
     HalfOpen {
         /// The impact.

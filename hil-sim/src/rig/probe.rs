@@ -69,8 +69,7 @@ impl RigConfig {
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn response(&self, configuration: Configuration, name: &str) -> Result<&ResponsePoint, RigError> {
         let of_mass = || self.known_mass_in(configuration).map(|mass| &mass.response);
-        let of_open =
-            || self.open_joint_in(configuration).into_iter().flat_map(|open| open.points().map(|own| own.1));
+        let of_open = || self.open_joint_in(configuration).map(|open| &open.response);
         let there = || {
             let own = self.response_points().filter(|point| self.has(configuration, point.body));
             own.chain(of_mass()).chain(of_open())
@@ -89,8 +88,7 @@ impl RigConfig {
     /// [`RigError::UnknownPoint`] listing the valid names.
     pub fn impact(&self, configuration: Configuration, name: &str) -> Result<&ImpactPoint, RigError> {
         let of_mass = || self.known_mass_in(configuration).map(|mass| &mass.impact);
-        let of_open =
-            || self.open_joint_in(configuration).into_iter().flat_map(|open| open.points().map(|own| own.0));
+        let of_open = || self.open_joint_in(configuration).map(|open| &open.impact);
         let there = || {
             let own = self.impacts.iter().filter(|point| self.has(configuration, point.body));
             own.chain(of_mass()).chain(of_open())

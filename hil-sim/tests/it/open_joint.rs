@@ -41,25 +41,6 @@ fn nothing_reaches_b_but_by_another_path() {
 }
 
 #[test]
-fn a_hit_on_b_moves_b_and_not_a() {
-    let mut config = RigConfig::elastic();
-    config.errors.none = true;
-    let mut rig = Rig::new(&config, 1).unwrap();
-    rig.stage(Configuration::Ajb, "OPEN_B", "OPEN_B", 0).unwrap();
-    rig.fire(3.5e-3);
-    let mut codes = [0; CHANNELS];
-    let mut largest: [f64; 3] = [0.0; 3];
-    for _ in 0..1024 {
-        rig.scan(&mut codes);
-        let truth = rig.truth();
-        let seen = [truth[4], truth[5], truth[6..9].iter().sum()];
-        largest = std::array::from_fn(|i| largest[i].max(f64::abs(seen[i])));
-    }
-    let [ldv_a, ldv_b, load_cells] = largest;
-    assert!(ldv_a < 1e-12 && ldv_b > 1e-5 && load_cells > 1.0, "{largest:?}");
-}
-
-#[test]
 fn a_contact_that_drifts_and_slips_is_open_too_and_closes_again() {
     let mut config = RigConfig::elastic();
     config.contact.drift_per_hit = 1e-3;
@@ -82,16 +63,14 @@ fn a_contact_that_drifts_and_slips_is_open_too_and_closes_again() {
 #[test]
 fn hammer_and_vibrometer_go_to_it_together_and_only_in_the_assembly() {
     let mut rig = Rig::new(&RigConfig::elastic(), 1).unwrap();
-    for (impact, response) in [("OPEN", "A3"), ("OPEN", "OPEN_B"), ("OPEN_B", "OPEN"), ("BZ3", "OPEN_B")] {
-        let half = rig.stage(Configuration::Ajb, impact, response, 0).unwrap_err();
-        assert!(matches!(half, RigError::HalfOpen { .. }), "{half}");
-    }
+    let half = rig.stage(Configuration::Ajb, "OPEN", "A3", 0).unwrap_err();
+    assert!(matches!(half, RigError::HalfOpen { .. }), "{half}");
     let elsewhere = rig.stage(Configuration::A, "OPEN", "OPEN", 0).unwrap_err();
     assert!(elsewhere.to_string().contains("no impact point"), "{elsewhere}");
 }
 
 #[test]
-fn its_points_are_on_their_sides_and_have_names_of_their_own() {
+fn its_points_are_on_side_a_and_have_names_of_their_own() {
     let with = |impact: &str, body: &str| {
         let mut config = RigConfig::elastic();
         let open = config.open_joint.as_mut().unwrap();
@@ -105,9 +84,4 @@ fn its_points_are_on_their_sides_and_have_names_of_their_own() {
     assert_eq!(with("OPEN", "arm_a"), Ok(()));
     assert!(with("AZ1", "arm_a").unwrap_err().contains("is the name of one of the impacts"));
     assert!(with("OPEN", "arm_b").unwrap_err().contains("must be on side A"));
-    assert!(with("OPEN_B", "arm_a").unwrap_err().contains("the impact on side A"));
-    let mut config = RigConfig::elastic();
-    config.open_joint.as_mut().unwrap().on_b.as_mut().unwrap().response.body =
-        jointrig_hil_sim::rig::config::BodyName::ArmA;
-    assert!(config.check().unwrap_err().to_string().contains("must be on side B"));
 }

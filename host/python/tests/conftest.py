@@ -48,7 +48,7 @@ def short_contact_plan(path: Path) -> Path:
     command("plan", "new", path, "--template", "contact")
     text = path.read_text()
     text = re.sub(r'impacts = \["BZ1".*\]', 'impacts = ["BZ1", "BZ2", "BZ3"]', text)
-    for impact, response in [("OPEN", "OPEN"), ("OPEN_B", "OPEN_B"), ("AZ3", "A3")]:
+    for impact, response in [("OPEN", "OPEN"), ("AZ3", "A3")]:
         block = f'[[configuration]]\nname = "AJB"\nimpacts = ["{impact}"]\nresponses = ["{response}"]\n'
         assert block in text, block
         text = text.replace(block, "")

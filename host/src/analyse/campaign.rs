@@ -41,12 +41,9 @@ pub fn analyse_measurements<M: Measurements>(
         missing.push(why);
         None
     });
-    let paths = [separate_cells::second_path(measurements), separate_cells::path_to_ground(measurements)];
-    let paths = paths.map(|path| {
-        path.unwrap_or_else(|why| {
-            missing.push(why);
-            None
-        })
+    let second_path = separate_cells::second_path(measurements).unwrap_or_else(|why| {
+        missing.push(why);
+        None
     });
     let data_quality = chosen::data_quality(geometry, &cells.averages);
 
@@ -139,7 +136,7 @@ pub fn analyse_measurements<M: Measurements>(
             joint.allow_for(&drift);
         }
     }
-    for path in paths.into_iter().flatten().filter(SecondPath::found) {
+    if let Some(path) = second_path.filter(SecondPath::found) {
         if let Ok(own) = &mut own_stiffness {
             own.allow_for_path(&path);
         }

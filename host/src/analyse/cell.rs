@@ -112,14 +112,14 @@ pub struct MassCell {
     pub lasers: bool,
 }
 
-/// A cell with the joint open and the one that it is compared with, in which the same side is
-/// struck.
+/// The cells that show what passes beside the contact: A is struck with the joint open, then
+/// closed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OpenAndCompared {
+pub struct OpenAndClosed {
     /// The cell with the joint open.
     pub open: CellName,
-    /// On A the cell with the joint closed, on B the one of B alone.
-    pub compared: CellName,
+    /// The cell with the joint closed.
+    pub closed: CellName,
     /// Index of each response's axis along the sliding direction.
     pub axes: [usize; 2],
 }
@@ -228,13 +228,7 @@ pub trait Measurements: Sync {
 
     /// The cells that show what passes beside the contact, if the plan has them. The one with the
     /// joint open is not one of [`Measurements::cells`].
-    fn open_joint(&self) -> Option<OpenAndCompared> {
-        None
-    }
-
-    /// The cells that show what holds side B in the assembly only, if the plan has them. The one
-    /// with the joint open is not one of [`Measurements::cells`].
-    fn open_joint_on_b(&self) -> Option<OpenAndCompared> {
+    fn open_joint(&self) -> Option<OpenAndClosed> {
         None
     }
 

@@ -6,8 +6,8 @@ use super::assemble::{everything, hits};
 use super::averages::{Asked, CellAverage, CellSums};
 use super::campaign::analyse_measurements;
 use super::cell::{
-    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, OpenAndCompared, Progress,
-    SensorMass, ShakerLevel, Wanted,
+    CellName, ContactDelays, Hit, KnownContact, MassCell, Measurements, OpenAndClosed, Progress, SensorMass,
+    ShakerLevel, Wanted,
 };
 use super::chosen::DataQuality;
 use super::findings::Findings;
@@ -474,16 +474,6 @@ impl CampaignFile {
     }
 }
 
-/// The cells' names; the compared one is of this structure.
-fn open_and_compared(cells: OpenJointCells, compared: Structure) -> OpenAndCompared {
-    let name = |configuration, [impact, response]: [String; 2]| CellName { configuration, impact, response };
-    OpenAndCompared {
-        open: name(Structure::Ajb, cells.open),
-        compared: name(compared, cells.compared),
-        axes: cells.axes,
-    }
-}
-
 impl Measurements for CampaignFile {
     type Error = AnalyseError;
 
@@ -500,8 +490,7 @@ impl Measurements for CampaignFile {
     }
 
     fn cells(&self) -> Vec<CellName> {
-        let opened = [self.open_joint(), self.open_joint_on_b()].map(|cells| cells.map(|own| own.open));
-        let apart = [self.known_mass().map(|cell| cell.name), opened[0].clone(), opened[1].clone()];
+        let apart = [self.known_mass().map(|cell| cell.name), self.open_joint().map(|cells| cells.open)];
         let names = self.cells.iter().map(|c| &c.name);
         names.filter(|name| !apart.iter().flatten().any(|own| own == *name)).cloned().collect()
     }
@@ -568,12 +557,14 @@ impl Measurements for CampaignFile {
         })
     }
 
-    fn open_joint(&self) -> Option<OpenAndCompared> {
-        Some(open_and_compared(self.plan.open_joint_cells()?, Structure::Ajb))
-    }
-
-    fn open_joint_on_b(&self) -> Option<OpenAndCompared> {
-        Some(open_and_compared(self.plan.open_joint_cells_on_b()?, Structure::B))
+    fn open_joint(&self) -> Option<OpenAndClosed> {
+        let OpenJointCells { open, closed, axes } = self.plan.open_joint_cells()?;
+        let [open, closed] = [open, closed].map(|[impact, response]| CellName {
+            configuration: Structure::Ajb,
+            impact,
+            response,
+        });
+        Some(OpenAndClosed { open, closed, axes })
     }
 
     fn sensor_masses(&self) -> Vec<SensorMass> {

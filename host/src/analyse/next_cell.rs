@@ -10,7 +10,7 @@ use super::cell::{CellName, KnownContact, Measurements};
 use super::cells_stage::{Cells, drift_of_the_contact, read, slip_under_the_hammer};
 use super::contact_answer::{cells as contact_cells, input, reads};
 use super::from_store::{AnalyseError, CampaignFile};
-use super::separate_cells::{known_mass, path_to_ground, second_path};
+use super::separate_cells::{known_mass, second_path};
 use crate::campaign::plan::Plan;
 use crate::campaign::store::Store;
 use crate::contact::{
@@ -222,8 +222,7 @@ pub fn outlook(store: &Store, times: Times, averaged: &mut Averaged) -> Result<O
         found.allow_for(&drift);
         forecast.state(&found.k_t_n_per_m);
     }
-    let paths = [second_path(&file), path_to_ground(&file)].map(Result::unwrap_or_default);
-    for path in paths.into_iter().flatten().filter(SecondPath::found) {
+    if let Some(path) = second_path(&file).unwrap_or_default().filter(SecondPath::found) {
         found.allow_for_path(&path);
         forecast.state(&found.k_t_n_per_m);
     }
@@ -447,7 +446,7 @@ impl Outlook {
             .into_iter()
             .filter(|(cause, _)| *cause != Cause::Noise)
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let stated = !matches!(cause, Cause::Misfit | Cause::Drift | Cause::SecondPath | Cause::PathToGround);
+        let stated = !matches!(cause, Cause::Misfit | Cause::Drift | Cause::SecondPath);
         let half_width_if_halved = stated.then(|| self.forecast.half_width_with(cause, 0.5));
         Some(Dominating { cause, share, half_width_if_halved })
     }

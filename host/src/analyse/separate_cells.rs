@@ -1,9 +1,9 @@
 //! The cells that belong to no FRF matrix: on the known mass, and with the joint open.
 
 use super::averages::{Asked, CellAverage, CellSums, LINES_HZ};
-use super::cell::{CellName, MassCell, Measurements, OpenAndCompared};
+use super::cell::{CellName, MassCell, Measurements, OpenAndClosed};
 use super::missing::Missing;
-use crate::contact::{HitsOnA, HitsOnB, KnownMass, SecondPath, mass_ratio};
+use crate::contact::{HitsOnA, KnownMass, SecondPath, mass_ratio};
 use crate::spectra::MotionQuantity;
 
 /// The ratios of the sensors to the hammer from the hits on the known mass; `None` if the plan has
@@ -31,39 +31,15 @@ pub fn known_mass<M: Measurements>(measurements: &M) -> Result<Option<KnownMass>
 /// # Errors
 /// The hits cannot be read, do not match, or lack a signal.
 pub fn second_path<M: Measurements>(measurements: &M) -> Result<Option<SecondPath>, Missing> {
-    let Some(OpenAndCompared { open, compared, axes }) = measurements.open_joint() else { return Ok(None) };
+    let Some(OpenAndClosed { open, closed, axes }) = measurements.open_joint() else { return Ok(None) };
     let of = |name: &CellName| average(measurements, name, Asked { contact: false, damped: true });
-    let (Some(seen_open), Some(seen_closed)) = (of(&open)?, of(&compared)?) else { return Ok(None) };
+    let (Some(seen_open), Some(seen_closed)) = (of(&open)?, of(&closed)?) else { return Ok(None) };
     let quantity = measurements.quantity();
     let path = hits_on_a(&seen_open, axes[0], quantity)
         .zip(hits_on_a(&seen_closed, axes[1], quantity))
         .and_then(|(open, closed)| SecondPath::of(&open, &closed));
     let told = "the load cells or the vibrometer next to the contact on B are missing".to_owned();
     path.map(Some).ok_or(Missing::Records { cell: open, told })
-}
-
-/// The part of the force that passes from B to the ground in the assembly only; `None` if the plan
-/// has no cell for it, or before the first hit of it or of the cell that it is compared with.
-///
-/// # Errors
-/// The hits cannot be read, do not match, or lack the load cells.
-pub fn path_to_ground<M: Measurements>(measurements: &M) -> Result<Option<SecondPath>, Missing> {
-    let Some(OpenAndCompared { open, compared, axes }) = measurements.open_joint_on_b() else {
-        return Ok(None);
-    };
-    let of = |name: &CellName| average(measurements, name, Asked { contact: false, damped: true });
-    let (Some(seen_open), Some(alone)) = (of(&open)?, of(&compared)?) else { return Ok(None) };
-    let quantity = measurements.quantity();
-    let path = hits_on_b(&seen_open, axes[0], quantity)
-        .zip(hits_on_b(&alone, axes[1], quantity))
-        .and_then(|(open, alone)| SecondPath::to_ground(&open, &alone));
-    path.map(Some).ok_or(Missing::Records { cell: open, told: "the load cells are missing".to_owned() })
-}
-
-/// `None` unless the load cells were measured.
-fn hits_on_b(average: &CellAverage, axis: usize, quantity: MotionQuantity) -> Option<HitsOnB<'_>> {
-    let spectra = average.damped.as_ref()?;
-    (spectra.outputs() > average.spectra.outputs()).then_some(HitsOnB { spectra, axis, quantity })
 }
 
 /// `None` unless both vibrometers next to the contact and the load cells were measured.

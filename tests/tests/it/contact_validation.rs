@@ -39,8 +39,8 @@ fn answer(rig: &RigConfig, found: &ContactAnswer) -> Option<Answer> {
     found.k_t_n_per_m.map(|k| Answer::new(k.mean, k.ci95, truth))
 }
 
-/// Hits of `contact.toml` on the rig: 60 cells of six, without those on the known mass.
-const HITS: f64 = 360.0;
+/// Hits of `contact.toml` on the rig: 59 cells of six, without those on the known mass.
+const HITS: f64 = 354.0;
 
 /// One sound campaign.
 struct Sound {
@@ -98,19 +98,6 @@ fn rigs_not_used_in_development() {
     println!("truths in each tenth of the stated distribution: {tenths:?}");
     let named = all.iter().filter(|one| one.contradicts).count();
     println!("contradictions named although all is as stated: {named} of {}", all.len());
-}
-
-/// In this campaign the first search ends in a local minimum 2.1 standard deviations from the truth.
-/// With another cell the noise would be another.
-#[test]
-fn the_lowest_minimum_is_found() {
-    let rig = sound(10006);
-    let block = "[[configuration]]\nname = \"AJB\"\nimpacts = [\"OPEN_B\"]\nresponses = [\"OPEN_B\"]\n";
-    let plan = contact_plan(&rig);
-    assert!(plan.contains(block));
-    let found = results(10006, &rig, &plan.replace(block, "")).answer.unwrap().contact;
-    let found = answer(&rig, &found).expect("a k_T");
-    assert!(found.z.abs() < 1.0, "z {}", found.z);
 }
 
 #[test]
@@ -172,17 +159,6 @@ const EXAMPLES: usize = 5;
 /// A false assumption: its name, what makes it false in the i-th of its [`EXAMPLES`], and what the
 /// answer must say of it.
 type False = (&'static str, fn(&mut RigConfig, usize), &'static [&'static str]);
-
-#[test]
-fn a_wire_that_holds_b_in_the_assembly_only_is_named_and_allowed_for() {
-    let mut rig = RigConfig::elastic();
-    path(&mut rig, "[\"arm_b\", \"ground\"]", -0.03);
-    let found = measured_shortly(6, &RigConfig::elastic(), &rig).answer.unwrap().contact;
-    let answer = answer(&rig, &found).expect("a k_T");
-    assert!(answer.covers, "{}: {:?}", found.why, found.k_t_n_per_m);
-    assert!(found.why.contains("from B to the ground in the assembly"), "{}", found.why);
-    assert!(found.why.contains("touches arm B"), "{}", found.why);
-}
 
 fn offset(rig: &mut RigConfig, name: &str, by_m: [f64; 3]) {
     rig.errors.offset_m.insert(name.into(), by_m);
@@ -269,7 +245,7 @@ const FALSE: [False; 17] = [
     (
         "a wire of 3 N/µm holds arm B in the assembly",
         |rig, _| path(rig, "[\"arm_b\", \"ground\"]", -0.03),
-        &["touches arm B"],
+        &["cable"],
     ),
     (
         "points of arm B three times worse than stated",

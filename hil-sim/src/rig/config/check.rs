@@ -306,31 +306,18 @@ fn known_mass(mass: &KnownMass) -> Result<(), RigError> {
 }
 
 fn open_joint(config: &RigConfig, open: &OpenJoint) -> Result<(), RigError> {
-    let sides = [
-        ("open_joint", Configuration::A, "must be on side A"),
-        ("open_joint.on_b", Configuration::B, "must be on side B"),
-    ];
-    for ((table, side, wrong), (impact, response)) in sides.into_iter().zip(open.points()) {
-        struck_and_seen(table, impact, response)?;
-        for (field, body) in [("impact", impact.body), ("response", response.body)] {
-            if !config.has(side, body) {
-                return Err(bad(&format!("{table}.{field}.body"), wrong));
-            }
-        }
-        if config.impacts.iter().any(|own| own.name == impact.name) {
-            return Err(bad(&format!("{table}.impact.name"), "is the name of one of the impacts"));
-        }
-        if config.response_points().any(|own| own.name == response.name) {
-            return Err(bad(&format!("{table}.response.name"), "is the name of one of the responses"));
+    struck_and_seen("open_joint", &open.impact, &open.response)?;
+    for (field, body) in [("impact", open.impact.body), ("response", open.response.body)] {
+        if !config.has(Configuration::A, body) {
+            return Err(bad(&format!("open_joint.{field}.body"), "must be on side A"));
         }
     }
-    if let Some(on_b) = &open.on_b {
-        if on_b.impact.name == open.impact.name {
-            return Err(bad("open_joint.on_b.impact.name", "is the name of the impact on side A"));
-        }
-        if on_b.response.name == open.response.name {
-            return Err(bad("open_joint.on_b.response.name", "is the name of the response on side A"));
-        }
+    let named = |name: &str| config.impacts.iter().any(|own| own.name == name);
+    if named(&open.impact.name) {
+        return Err(bad("open_joint.impact.name", "is the name of one of the impacts"));
+    }
+    if config.response_points().any(|own| own.name == open.response.name) {
+        return Err(bad("open_joint.response.name", "is the name of one of the responses"));
     }
     Ok(())
 }
@@ -792,18 +779,9 @@ pub fn read(text: &str) -> Result<RigConfig, RigError> {
         let reason = "describes the paper's rig, and [structure] another one: remove one of them".to_owned();
         return Err(RigError::Field { field: field.to_owned(), reason, line });
     }
-    if user.get_ref().contains_key("structure") {
-        // the default's points are on the paper's arms
-        let own = user.get_ref().get("open_joint").and_then(|own| own.get_ref().as_table());
-        let on_b = own.is_some_and(|own| own.contains_key("on_b"));
-        if own.is_none() {
-            merged.get_mut().remove("open_joint");
-        } else if !on_b
-            && let Some(DeValue::Table(default)) =
-                merged.get_mut().get_mut("open_joint").map(Spanned::get_mut)
-        {
-            default.remove("on_b");
-        }
+    if user.get_ref().contains_key("structure") && !user.get_ref().contains_key("open_joint") {
+        // the default's points are on the paper's arm A
+        merged.get_mut().remove("open_joint");
     }
     // Only the user's text can be wrong here, so every span refers to it.
     let config = RigConfig::deserialize(toml::Deserializer::from(merged))

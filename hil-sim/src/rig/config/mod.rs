@@ -385,36 +385,15 @@ pub struct KnownMass {
     pub response: ResponsePoint,
 }
 
-/// Points that are used while the joint is open: both sides are in place, as in the assembly, and
-/// the specimens do not touch. What reaches side B after a hit on side A passes beside the contact.
+/// Points of side A that are used while the joint is open: both sides are in place, as in the
+/// assembly, and the specimens do not touch. What then reaches side B passes beside the contact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OpenJoint {
-    /// Where the hammer hits side A.
-    pub impact: ImpactPoint,
-    /// Where the 3-D vibrometer then measures, on side A.
-    pub response: ResponsePoint,
-    /// Points of side B: hits there show what holds it that does not hold B alone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub on_b: Option<OpenOnB>,
-}
-
-/// Points of side B that are used while the joint is open.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OpenOnB {
     /// Where the hammer hits.
     pub impact: ImpactPoint,
     /// Where the 3-D vibrometer measures.
     pub response: ResponsePoint,
-}
-
-impl OpenJoint {
-    /// Impact and response on side A, then those on side B.
-    pub fn points(&self) -> impl Iterator<Item = (&ImpactPoint, &ResponsePoint)> {
-        let on_b = self.on_b.iter().map(|own| (&own.impact, &own.response));
-        std::iter::once((&self.impact, &self.response)).chain(on_b)
-    }
 }
 
 /// The two spots next to the contact.

@@ -87,13 +87,9 @@ fn tested(own: &Parameter) -> bool {
         | Cause::Skew
         | Cause::SensorAxes => true,
         Cause::HammerTilt => own.tilted.is_some_and(|[z, _]| z.abs() < ACROSS),
-        Cause::Noise
-        | Cause::Aim
-        | Cause::Bending
-        | Cause::Drift
-        | Cause::SecondPath
-        | Cause::PathToGround
-        | Cause::Misfit => false,
+        Cause::Noise | Cause::Aim | Cause::Bending | Cause::Drift | Cause::SecondPath | Cause::Misfit => {
+            false
+        }
     };
     tested && own.stated && own.sigma.is_finite() && own.sigma > 0.0
 }

@@ -33,7 +33,7 @@
 //! - `outcome`: the result and the sources of its uncertainty, tests of the assumptions, and the
 //!   band in which the bodies are rigid
 //! - `forecast`: k_T's interval after further hits, without another fit
-//! - `second_path`: the part of the force that passes beside the contact or the load cells
+//! - `second_path`: the part of the force that passes beside the contact
 //! - `driven`: the rotation of the bodies while the shaker runs
 //! - `levels`: k_T of the shaker's levels, given the result of the hits; the average of both
 
@@ -74,7 +74,7 @@ pub use outcome::{
     Diagnosis, Doubt, FORCE_BALANCE, Farthest, Interval, OfFrequency, SignalResidual, Stiffness,
 };
 pub use parameters::{Cause, ContactPriors, HAMMER_GAIN, MASS_ERROR};
-pub use second_path::{HitsOnA, HitsOnB, Joins, SecondPath};
+pub use second_path::{HitsOnA, SecondPath};
 
 use crate::band::Band;
 use crate::substructuring::geometry::Grouping;

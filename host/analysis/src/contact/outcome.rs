@@ -13,7 +13,7 @@ use super::block::Block;
 use super::contradictions::{self, Changes, Contradiction, Worst};
 use super::parameters::{COMPLIANCE, Cause, FORM, HAMMER, MASS_ERROR, Parameters, RETARDATION};
 use super::solver::{BIN_HZ, Bin, Certainty, Solution};
-use super::{ContactError, Fit, HeldOut, Input, Joins, SecondPath};
+use super::{ContactError, Fit, HeldOut, Input, SecondPath};
 use crate::band::Band;
 use crate::hysteresis::contact_drift::ContactDrift;
 use crate::identified::COMPLIANCE_HALF_WIDTH;
@@ -174,33 +174,23 @@ impl Stiffness {
         }
     }
 
-    /// Allows for a part of the force that passes beside the contact or the load cells: the interval
-    /// then contains k_T with and without it. If no interval is useful, this is a doubt.
+    /// Allows for a part of the force that passes beside the contact: the interval then contains
+    /// k_T with and without it. If no interval is useful, this is a doubt.
     pub fn allow_for_path(&mut self, path: &SecondPath) {
-        let stiffness = format!("{:.1} N/µm", 1e-6 * path.stiffness_n_per_m.abs());
-        let (what, doubt) = match path.joins {
-            Joins::Sides => (format!("a second path of {stiffness}"), Doubt::SecondPath),
-            Joins::Ground => (format!("a path of {stiffness} from B to the ground"), Doubt::PathToGround),
-        };
-        self.contradictions.push(Contradiction::by(&what, of_path(path), [path.part, path.std()]));
+        let what = format!("a second path of {:.1} N/µm", 1e-6 * path.stiffness_n_per_m);
+        let own = Contradiction::by(&what, Cause::SecondPath, [path.part, path.std()]);
+        self.contradictions.push(own);
         match beside(self.k_t_n_per_m, &mut self.budget, path) {
             Some(k_t) => self.k_t_n_per_m = k_t,
-            None => self.doubts.push(doubt),
+            None => self.doubts.push(Doubt::SecondPath),
         }
     }
 }
 
-fn of_path(path: &SecondPath) -> Cause {
-    match path.joins {
-        Joins::Sides => Cause::SecondPath,
-        Joins::Ground => Cause::PathToGround,
-    }
-}
-
 /// k_T with an interval that contains it with and without the part of the force that passes beside
-/// the contact or the load cells; `None` if no useful interval remains.
+/// the contact; `None` if no useful interval remains.
 pub fn beside(k_t: Interval, budget: &mut BTreeMap<Cause, f64>, path: &SecondPath) -> Option<Interval> {
-    offset(k_t, budget, of_path(path), path.part.abs() + NORMAL_95 * path.std())
+    offset(k_t, budget, Cause::SecondPath, path.part + NORMAL_95 * path.std())
 }
 
 /// k_T with an interval that contains the stiffness in the first and in the last hits; `None` if it
@@ -445,8 +435,6 @@ pub enum Doubt {
     Drift,
     /// Much of the force passes beside the contact.
     SecondPath,
-    /// Much of the force passes from B to the ground, beside the load cells.
-    PathToGround,
 }
 
 /// The compliance from a subset of the lines, with all other parameters from all lines: its

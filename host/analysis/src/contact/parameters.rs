@@ -94,11 +94,6 @@ const TURN_PER_M: [f64; 2] = [110.0, 50.0];
 const LATERAL_N_PER_M: [f64; 2] = [1.5e8, 2.2e8];
 const LATERAL_SPREAD: f64 = 0.6;
 
-/// Expected c_T/k_T, s: a loss factor of 0.4 at 200 Hz. Metal contacts have a tenth of it, and hits
-/// determine it to a hundredth. Without it, a search may run off to a contact that only damps, with
-/// 1/k_T and c_T/k_T infinite.
-const RETARDATION_S: f64 = 3e-4;
-
 /// One parameter: start value, prior width, and the cause under which its share of the uncertainty
 /// is listed.
 #[derive(Debug, Clone, PartialEq)]
@@ -185,8 +180,7 @@ impl Parameters {
     ) -> Self {
         let named = |name: &str, start, sigma, cause| Parameter::new(name.to_owned(), start, sigma, cause);
         let free = |name: &str, start| named(name, start, f64::INFINITY, Cause::Noise);
-        let damping = named("c_T/k_T", 0.0, RETARDATION_S, Cause::Noise);
-        let mut all = vec![free("1/k_T", compliance_m_per_n), Parameter { stated: false, ..damping }];
+        let mut all = vec![free("1/k_T", compliance_m_per_n), free("c_T/k_T", 0.0)];
         all.push(named("the load cells' gain", 1.0, priors.gain.max(LOAD_CELL_GAIN), Cause::Gains));
         all.push(named("the load cells' delay", 0.0, priors.skew_s.hypot(LOAD_CELL_SKEW_S), Cause::Skew));
         all.extend((2..FORM_TERMS).map(|_| free("the force's form", 0.0)));
@@ -376,8 +370,6 @@ pub enum Cause {
     Drift,
     /// Part of the force passes beside the contact.
     SecondPath,
-    /// Part of the force passes from B to the ground, beside the load cells.
-    PathToGround,
     /// The model does not describe the signals down to their noise.
     Misfit,
 }
@@ -399,7 +391,6 @@ impl Cause {
             Cause::Bending => "bending",
             Cause::Drift => "drift",
             Cause::SecondPath => "second-path",
-            Cause::PathToGround => "path-to-ground",
             Cause::Misfit => "misfit",
         }
     }

@@ -64,7 +64,6 @@ pub struct Solution {
 }
 
 /// A point of the search.
-#[derive(Clone)]
 struct SearchPoint {
     p: Vec<f64>,
     bins: Vec<Bin>,
@@ -115,23 +114,18 @@ pub fn solve(
     Posterior { blocks, parameters, shared }.centre(&mut from)?;
     let searched: Vec<Result<Minimum, ContactError>> =
         starts.par_iter().map(|start| search(blocks, parameters, &from, start, shared)).collect();
-    let (mut found, mut refused) = (Vec::new(), None);
-    for search in searched {
-        match search {
-            Ok(minimum) => found.push(minimum),
+    let reached: Vec<(f64, Vec<f64>)> =
+        searched.iter().flatten().map(|found| (found.cost, found.place.p.clone())).collect();
+    let mut refused = None;
+    let mut best: Option<Minimum> = None;
+    for found in searched {
+        match found {
+            Ok(found) if best.as_ref().is_none_or(|best| found.cost < best.cost) => best = Some(found),
+            Ok(_) => {}
             Err(error) => refused = Some(refused.unwrap_or(error)),
         }
     }
-    let first = lowest(&found).ok_or_else(|| refused.unwrap_or_else(not_converged))?;
-    // a side from which no minimum is reached has none to offer
-    let beside: Vec<Minimum> = [-BESIDE, BESIDE]
-        .par_iter()
-        .filter_map(|sigmas| search_beside(first, parameters, *sigmas, shared).ok())
-        .collect();
-    found.extend(beside);
-    let reached: Vec<(f64, Vec<f64>)> =
-        found.iter().map(|found| (found.cost, found.place.p.clone())).collect();
-    let Minimum { blocks, place: here, cost, .. } = lowest(&found).ok_or_else(not_converged)?.clone();
+    let Minimum { blocks, place: here, cost } = best.ok_or_else(|| refused.unwrap_or_else(not_converged))?;
     let (information, _) = Posterior { blocks: &blocks, parameters, shared }.normal(&here);
     let mut certainty = certainty(&blocks, &here.bins, &here.p, &information, shared)?;
     if let Some((weight, way)) = other_minimum(cost, &here.p, &reached) {
@@ -151,26 +145,14 @@ fn other_minimum(cost: f64, p: &[f64], reached: &[(f64, Vec<f64>)]) -> Option<(f
         ((1.0 + (other - cost).exp()).recip(), way)
     };
     let effect = |(weight, way): &(f64, DVector<f64>)| weight * way[COMPLIANCE].powi(2);
-    let all = reached.iter().map(of).filter(|one| one.0 > IMPROBABLE && effect(one) > 0.0);
+    let all = reached.iter().map(of).filter(|one| effect(one) > 0.0);
     all.max_by(|a, b| effect(a).total_cmp(&effect(b)))
 }
 
-/// A minimum where the truth is with a smaller probability than this is not allowed for: however far
-/// away it is, an interval of 95 % need not contain it.
-const IMPROBABLE: f64 = 1e-3;
-
-/// The minimum with the smallest cost.
-fn lowest(found: &[Minimum]) -> Option<&Minimum> {
-    found.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
-}
-
 /// The end of a search, with its noise.
-#[derive(Clone)]
 struct Minimum {
     blocks: Vec<Block>,
     place: SearchPoint,
-    /// The parameters with those held that the search holds to its end.
-    searched: Parameters,
     /// Minus the logarithm of the posterior. Searches end with different noise, so that it contains
     /// the noise's normalisation.
     cost: f64,
@@ -187,7 +169,7 @@ fn search(
     start: &Start,
     shared: f64,
 ) -> Result<Minimum, ContactError> {
-    let blocks = blocks.to_vec();
+    let mut blocks = blocks.to_vec();
     let (mut searched, mut p) = (parameters.clone(), from.to_vec());
     for (at, value) in &start.held {
         searched.hold(*at, *value);
@@ -202,47 +184,6 @@ fn search(
         let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
         (here, settled) = posterior.settle(here.p, motion, Widening::ToCome)?;
     }
-    widened(blocks, parameters, &searched, (here, settled), shared)
-}
-
-/// Distance, in standard deviations of the compliance, from which [`search_beside`] begins.
-const BESIDE: f64 = 2.0;
-
-/// Searches for a lower minimum beside `found`: the compliance is held `sigmas` standard deviations
-/// away while all others are fitted, and then released. What the search to `found` held stays held.
-/// On few rigs, a search ends in a local minimum from which a way of other parameters, at equal
-/// cost, leads beyond the interval; held there, they find it.
-fn search_beside(
-    found: &Minimum,
-    parameters: &Parameters,
-    sigmas: f64,
-    shared: f64,
-) -> Result<Minimum, ContactError> {
-    let blocks = found.blocks.clone();
-    let whole = Posterior { blocks: &blocks, parameters: &found.searched, shared };
-    let (information, gradient) = whole.normal(&found.place);
-    let (_, sigma) = newton(&information, &gradient, HARDLY_DAMPED)?;
-    let mut p = found.place.p.clone();
-    p[COMPLIANCE] += sigmas * sigma;
-    let mut held = found.searched.clone();
-    held.hold(COMPLIANCE, p[COMPLIANCE]);
-    let motion = motions(&blocks, &found.place.bins);
-    let (there, _) =
-        Posterior { blocks: &blocks, parameters: &held, shared }.settle(p, motion, Widening::Begun)?;
-    let motion = motions(&blocks, &there.bins);
-    let end = whole.settle(there.p, motion, Widening::Begun)?;
-    widened(blocks, parameters, &found.searched, end, shared)
-}
-
-/// Widens the noise by what the end of a search leaves, and searches on from there.
-fn widened(
-    mut blocks: Vec<Block>,
-    parameters: &Parameters,
-    searched: &Parameters,
-    end: (SearchPoint, bool),
-    shared: f64,
-) -> Result<Minimum, ContactError> {
-    let (mut here, mut settled) = end;
     for _ in 0..WIDENED {
         let left: Vec<(usize, &Residual)> = (here.bins.iter())
             .flat_map(|bin| bin.residuals.iter().map(|residual| (bin.block, residual)))
@@ -251,7 +192,7 @@ fn widened(
             break;
         }
         let motion = motions(&blocks, &here.bins);
-        let posterior = Posterior { blocks: &blocks, parameters: searched, shared };
+        let posterior = Posterior { blocks: &blocks, parameters: &searched, shared };
         (here, settled) = posterior.settle(here.p, motion, Widening::Begun)?;
     }
     if !settled {
@@ -260,7 +201,7 @@ fn widened(
     let noise: f64 = here.bins.iter().map(|bin| normalisation(&blocks[bin.block], bin)).sum();
     let cost = Posterior { blocks: &blocks, parameters, shared }.prior(&here.p)
         + (here.bins.iter().map(|bin| bin.normal.chi_square).sum::<f64>() + noise) / shared;
-    Ok(Minimum { blocks, place: here, searched: searched.clone(), cost })
+    Ok(Minimum { blocks, place: here, cost })
 }
 
 /// Logarithm by which counting more noise than measured lowers the likelihood of a bin: that of its
@@ -323,7 +264,6 @@ impl Posterior<'_> {
         let mut stale = true;
         let mut damping = 1e-9;
         let mut at_rest = 0;
-        let held = self.parameters.all()[COMPLIANCE].sigma == 0.0;
         let mut costs = Vec::new();
         for step in 0..STEPS {
             costs.push(here.cost);
@@ -335,7 +275,7 @@ impl Posterior<'_> {
             let (step, sigma) = newton(&information, &gradient, damping)?;
             if damping <= HARDLY_DAMPED && step[COMPLIANCE].abs() <= SETTLED * sigma {
                 at_rest += 1;
-                if -0.5 * gradient.dot(&step) <= SETTLED || (at_rest >= AT_REST && !held) {
+                if -0.5 * gradient.dot(&step) <= SETTLED || at_rest >= AT_REST {
                     return Ok((here, true));
                 }
             } else {
@@ -822,8 +762,6 @@ mod tests {
         let all = [(5.0, place(1.0)), (5.0, place(1.5)), (35.0, place(3.0))];
         let (weight, way) = other_minimum(5.0, &here, &all).expect("another minimum");
         assert_eq!((weight, way.as_slice()), (0.5, [0.5, 1.5].as_slice()));
-        // so unlikely that it does not count, although it is very far
-        assert_eq!(other_minimum(5.0, &here, &[(5.0, place(1.0)), (45.0, place(1e15))]), None);
         // e times less likely
         let (weight, _) = other_minimum(5.0, &here, &[(6.0, place(1.5))]).expect("another minimum");
         assert!((weight - 1.0 / (1.0 + 1.0_f64.exp())).abs() < 1e-12, "{weight}");

@@ -4,8 +4,7 @@
 use super::faults::Faults;
 use super::sensor::{ResponsePoint, WORST_GAIN, check_sensors};
 use super::{
-    Cell, ConfigurationPlan, ImpactPoint, JOINT_OPEN, JOINT_OPEN_B, ON_KNOWN_MASS, Plan, configuration_name,
-    configuration_named, turned,
+    Cell, ConfigurationPlan, JOINT_OPEN, ON_KNOWN_MASS, Plan, configuration_name, configuration_named, turned,
 };
 use crate::contact::determines_motion;
 use jointrig_protocol::limits::{ARM_VALID_CAP_MS, COIL_PULSE_CAP_US, NAME_BYTES, SHAKE_SCANS_PER_CYCLE};
@@ -261,9 +260,9 @@ impl Plan {
                 format!("geometry: name `{name}` must have 1 to {NAME_BYTES} bytes"),
             );
             faults.unless(
-                (1..=JOINT_OPEN_B).contains(&grouping),
+                (1..=JOINT_OPEN).contains(&grouping),
                 at,
-                format!("geometry: grouping of `{name}` must be 1 to {JOINT_OPEN_B}"),
+                format!("geometry: grouping of `{name}` must be 1 to {JOINT_OPEN}"),
             );
             let (seen, kind) =
                 if is_response { (&mut sensors, "response") } else { (&mut hammers, "impact") };
@@ -414,44 +413,36 @@ impl Plan {
     /// Checks that hammer and vibrometer use the points of the open joint together, in a block of
     /// the assembly, and that a cell with the joint closed can be compared with it.
     fn check_open_joint(&self, faults: &mut Faults) {
-        let on_a = format!(
-            "what passes beside the open joint is compared with the closed one. This needs one impact and \
-             one response of grouping {JOINT_OPEN}, and one cell of AJB with an impact and a response on A (grouping 1 or 3); the 3-D \
-             vibrometer measures both responses along the sliding direction, and LDV_B is stated in geometry.sensor"
-        );
-        let on_b = format!(
-            "what holds side B with the joint open is compared with what holds B alone. This needs one impact and one response of \
-             grouping {JOINT_OPEN_B}, and one cell of B with an impact and a response on B (grouping 2 or 4); both impacts push the same \
-             way along the sliding direction, and the 3-D vibrometer measures both responses along it"
-        );
-        let sides = [
-            (JOINT_OPEN, on_a, self.open_joint_cells().is_some()),
-            (JOINT_OPEN_B, on_b, self.open_joint_cells_on_b().is_some()),
-        ];
         for block in &self.configuration {
             let (at, name) = (block.name.span().start, block.name.get_ref());
-            for (grouping, needs, compared) in &sides {
-                let [any, all] = self.any_and_all(block, *grouping);
-                if !any {
-                    continue;
-                }
-                faults.unless(
-                    all,
-                    at,
-                    format!(
-                        "configuration `{name}`: the joint is open at points of grouping {grouping} and these are used together: \
-                         give them a block of their own"
-                    ),
-                );
-                faults.unless(
-                    self.configuration(name) == Some(Configuration::Ajb),
-                    at,
-                    format!(
-                        "configuration `{name}`: points of grouping {grouping} are measured in AJB, with both sides in place"
-                    ),
-                );
-                faults.unless(!all || *compared, at, format!("configuration `{name}`: {needs}"));
+            let [any, all] = self.any_and_all(block, JOINT_OPEN);
+            if !any {
+                continue;
             }
+            faults.unless(
+                all,
+                at,
+                format!(
+                    "configuration `{name}`: the joint is open at points of grouping {JOINT_OPEN} and closed at all others: \
+                     give those points a block of their own"
+                ),
+            );
+            faults.unless(
+                self.configuration(name) == Some(Configuration::Ajb),
+                at,
+                format!(
+                    "configuration `{name}`: points of grouping {JOINT_OPEN} are measured in AJB, with both sides in place"
+                ),
+            );
+            faults.unless(
+                !all || self.open_joint_cells().is_some(),
+                at,
+                format!(
+                    "configuration `{name}`: what passes beside the open joint is compared with the closed one. This needs one impact and \
+                     one response of grouping {JOINT_OPEN}, and one cell of AJB with an impact and a response on A (grouping 1 or 3); the 3-D \
+                     vibrometer measures both responses along the sliding direction, and LDV_B is stated in geometry.sensor"
+                ),
+            );
         }
     }
 
@@ -525,16 +516,16 @@ pub struct KnownMassCell {
     pub lasers: bool,
 }
 
-/// The cell with the joint open and the one that it is compared with. Both have hits on one side
-/// and measure its motion along the sliding direction.
+/// The cell with the joint open and the one with the joint closed that it is compared with: in
+/// both, A is struck and its motion along the sliding direction is measured.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OpenJointCells {
     /// Impact and response of the cell with the joint open.
     pub open: [String; 2],
-    /// The same of the other one: on A with the joint closed, on B of B alone.
-    pub compared: [String; 2],
+    /// The same with the joint closed.
+    pub closed: [String; 2],
     /// Index of the axis along the sliding direction, of the open cell's response, then of the
-    /// other one's.
+    /// closed one's.
     pub axes: [usize; 2],
 }
 
@@ -603,62 +594,34 @@ impl Plan {
     /// with the joint open, one with which to compare it, and a vibrometer next to the contact on
     /// B.
     pub fn open_joint_cells(&self) -> Option<OpenJointCells> {
-        let place = |[_, response]: &[String; 2]| Some(self.response(response)?.position_m);
-        let found = self.open_and_compared(JOINT_OPEN, (Configuration::Ajb, &[1, 3]), place);
-        found.filter(|_| self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == "LDV_B"))
-    }
-
-    /// The cells that show what holds side B in the assembly only; `None` unless the plan has
-    /// exactly one on B with the joint open, and one of B alone with which to compare it.
-    pub fn open_joint_cells_on_b(&self) -> Option<OpenJointCells> {
-        let impacts = || self.geometry.impact.iter().map(Spanned::get_ref);
-        let direction = |point: &ImpactPoint| turned(&self.to_interface(), point.direction);
-        let of_open = direction(impacts().find(|point| point.grouping == JOINT_OPEN_B)?);
-        let alike = |point: &ImpactPoint| {
-            let cosine = direction(point).iter().zip(of_open).map(|(a, b)| a * b).sum::<f64>();
-            cosine > SAME_DIRECTION && of_open[2].abs() > ALONG_Z
-        };
-        let place = |[impact, _]: &[String; 2]| {
-            impacts().find(|point| point.name == *impact && alike(point)).map(|point| point.position_m)
-        };
-        self.open_and_compared(JOINT_OPEN_B, (Configuration::B, &[2, 4]), place)
-    }
-
-    /// The cell with points of the grouping `open`, and that of the other configuration and
-    /// groupings whose `place` is nearest to its own.
-    fn open_and_compared(
-        &self,
-        open: u8,
-        (configuration, groupings): (Configuration, &[u8]),
-        place: impl Fn(&[String; 2]) -> Option<[f64; 3]>,
-    ) -> Option<OpenJointCells> {
         let cells = self.cells();
-        let of = |configuration: Configuration, groupings: &[u8]| -> Vec<([String; 2], usize, [f64; 3])> {
+        let of = |impacts: &[u8], responses: &[u8]| -> Vec<([String; 2], usize)> {
             let own = cells.iter().filter(|cell| {
-                cell.configuration == configuration
-                    && self.impact_is(&cell.impact, groupings)
-                    && self.response_is(&cell.response, groupings)
+                cell.configuration == Configuration::Ajb
+                    && self.impact_is(&cell.impact, impacts)
+                    && self.response_is(&cell.response, responses)
             });
             own.filter_map(|cell| {
-                let names = [cell.impact.clone(), cell.response.clone()];
-                let at = place(&names)?;
-                Some((names, self.sliding_axis(&cell.response)?, at))
+                Some(([cell.impact.clone(), cell.response.clone()], self.sliding_axis(&cell.response)?))
             })
             .collect()
         };
-        let [(open, axis, here)] = &of(Configuration::Ajb, &[open])[..] else { return None };
-        let apart = |(_, _, at): &([String; 2], usize, [f64; 3])| {
-            (0..3).map(|n| (at[n] - here[n]).powi(2)).sum::<f64>()
+        let [(open, axis)] = &of(&[JOINT_OPEN], &[JOINT_OPEN])[..] else { return None };
+        let place = |names: &[String; 2]| self.response(&names[1]).map(|point| point.position_m);
+        let here = place(open)?;
+        let apart = |(names, _): &([String; 2], usize)| {
+            place(names).map_or(f64::INFINITY, |at| (0..3).map(|n| (at[n] - here[n]).powi(2)).sum::<f64>())
         };
-        let others = of(configuration, groupings);
-        let (compared, other_axis, _) =
-            others.into_iter().min_by(|one, other| apart(one).total_cmp(&apart(other)))?;
-        Some(OpenJointCells { open: open.clone(), compared, axes: [*axis, other_axis] })
+        let closed = of(&[1, 3], &[1, 3]);
+        let (closed, closed_axis) =
+            closed.into_iter().min_by(|one, other| apart(one).total_cmp(&apart(other)))?;
+        let ldv_b = self.geometry.sensor.iter().any(|sensor| sensor.get_ref().name == "LDV_B");
+        ldv_b.then(|| OpenJointCells { open: open.clone(), closed, axes: [*axis, closed_axis] })
     }
 
     /// Whether the joint is open in this cell.
     pub fn opens_joint(&self, cell: &Cell) -> bool {
-        self.impact_is(&cell.impact, &[JOINT_OPEN, JOINT_OPEN_B])
+        self.impact_is(&cell.impact, &[JOINT_OPEN])
     }
 
     /// Index of the axis along the sliding direction of a response that the 3-D vibrometer visits.

@@ -31,7 +31,7 @@ mod structure;
 pub const PAPER: &str = include_str!("../../../../docs/plans/paper.toml");
 /// All cells of the paper's campaign and those on the specimen, three good hits in each.
 pub const DEMO: &str = include_str!("../../../../docs/plans/demo.toml");
-/// The minimum for the contact's own stiffness: 61 cells of six hits.
+/// The minimum for the contact's own stiffness: 60 cells of six hits.
 pub const CONTACT: &str = include_str!("../../../../docs/plans/contact.toml");
 /// The paper's campaign and the cells on the specimen: yields both stiffnesses.
 pub const PAPER_CONTACT: &str = include_str!("../../../../docs/plans/paper-contact.toml");
@@ -501,11 +501,8 @@ pub const ON_KNOWN_MASS: u8 = 7;
 /// Grouping of the points of side A that are used while the joint is open.
 pub const JOINT_OPEN: u8 = 8;
 
-/// Grouping of the points of side B that are used while the joint is open.
-pub const JOINT_OPEN_B: u8 = 9;
-
 /// The groupings of points that are on none of the structures A, B and AJB as they are analysed.
-pub const SEPARATE: [u8; 3] = [ON_KNOWN_MASS, JOINT_OPEN, JOINT_OPEN_B];
+pub const SEPARATE: [u8; 2] = [ON_KNOWN_MASS, JOINT_OPEN];
 
 /// Standard deviations; values that are absent default to those of careful manual work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]

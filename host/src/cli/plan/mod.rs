@@ -53,7 +53,7 @@ pub struct New {
 /// The templates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Template {
-    /// The contact's own k_T: 61 cells of six hits.
+    /// The contact's own k_T: 60 cells of six hits.
     Contact,
     /// The same with a manual hammer and accelerometers instead of lasers: 13 places of ten hits.
     ContactByHand,

@@ -84,7 +84,6 @@ pub fn of_cause(cause: Cause) -> &'static str {
         Cause::Bending => "bending and shear of the specimens between sensors and contact",
         Cause::Drift => "the contact's change while it was hit",
         Cause::SecondPath => "the force that passes beside the contact",
-        Cause::PathToGround => "the force that passes from B to the ground",
         Cause::Misfit => "signals that the model does not explain",
     }
 }
@@ -113,7 +112,6 @@ fn contradicted(all: &[Contradiction]) -> String {
 pub fn contradicted_quantity(one: &Contradiction) -> String {
     match one.cause {
         Cause::SecondPath => "a second path beside the contact".into(),
-        Cause::PathToGround => "a path from B to the ground".into(),
         cause if one.scatter.is_some() => of_cause(cause).into(),
         Cause::SpecimenPoints | Cause::ArmPoints => one.what.clone(),
         _ => format!("the {}", one.what.trim_start_matches("the ")),
@@ -161,7 +159,6 @@ pub fn of_contradiction(one: &Contradiction) -> String {
              remove the cable, hose or stop that joins the two sides, and measure the assembly again.",
             one.what
         ),
-        Cause::PathToGround => path_to_ground(one, &off),
         Cause::Skew => {
             format!("{name} seems off by {off}: check the filters and the clock of its channel.")
         }
@@ -171,20 +168,6 @@ pub fn of_contradiction(one: &Contradiction) -> String {
             "{name} seems off by {off}: measure its place again, and enter it with `jointrig campaign places`."
         ),
     }
-}
-
-/// What holds B in the assembly only, or only while it was measured alone.
-fn path_to_ground(one: &Contradiction, told: &str) -> String {
-    let (when, seems) = if one.off[0][0] < 0.0 {
-        ("while B alone was measured, but not in the assembly", "stiffer")
-    } else {
-        ("in the assembly, but not while B alone was measured", "softer")
-    };
-    format!(
-        "About {told} of the force passes beside the load cells, by {} {when}, as the hits on B with the joint open show, and makes k_T seem {seems} \
-         by as much: remove the cable, hose or wire that touches arm B, or leave it in place for both, and measure again.",
-        one.what
-    )
 }
 
 /// The hammer's force against the load cells' in the hits on B alone.
@@ -207,7 +190,7 @@ fn how_far(one: &Contradiction) -> String {
     let of = |(axis, own): (usize, &[f64; 2])| {
         let [off, _] = *own;
         (significance(own) >= most.min(3.0)).then(|| match one.cause {
-            Cause::Gains | Cause::SensorAxes | Cause::Drift | Cause::SecondPath | Cause::PathToGround => {
+            Cause::Gains | Cause::SensorAxes | Cause::Drift | Cause::SecondPath => {
                 format!("{:.1} %", 100.0 * off.abs())
             }
             Cause::Skew => format!("{:.0} µs", 1e6 * off.abs()),
@@ -247,9 +230,6 @@ fn of_doubt(doubt: Doubt, diagnosis: &Diagnosis) -> String {
         Doubt::Drift => "the contact changed too much while it was hit for one stiffness to describe it",
         Doubt::SecondPath => {
             "much of the force between the arms passes beside the contact, as the hits with the joint open show"
-        }
-        Doubt::PathToGround => {
-            "much of the force passes from B to the ground beside the load cells, as the hits on B with the joint open show"
         }
         Doubt::Flatness => "the stiffness changes with frequency, which a contact's stiffness does not",
         Doubt::Sides => {

@@ -175,7 +175,6 @@ fn advice(largest: &Dominating) -> String {
         Cause::SensorAxes => "measure the axes of the fixed sensors, and state transverse in [priors]",
         Cause::Bending => "state the specimens' section, length and material in [specimens]",
         Cause::SecondPath => "remove the cable, hose or stop that joins the two sides beside the contact",
-        Cause::PathToGround => "remove what touches arm B, or leave it in place while B alone is measured",
         Cause::Drift => "let the contact run in before the campaign",
         Cause::Misfit => {
             "look at the checks of `jointrig analyse` for signals that the model does not explain"
