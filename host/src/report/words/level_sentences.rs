@@ -107,11 +107,11 @@ fn of_row(row: &Hysteresis, beside: bool) -> Vec<String> {
         let coefficient = row.friction_coefficient.map_or(
             "no coefficient μ without a normal load (--normal-load N)".to_owned(),
             |mu| {
-                let shown =
-                    row.friction_coefficient_ci95.map_or_else(|| short(mu), |ends| with_ends(mu, ends));
-                let of_what =
-                    row.friction_coefficient_ci95.map_or("", |_| ", of the scatter over the cycles alone");
-                format!("coefficient μ = {shown}{of_what}")
+                let shown = row.friction_coefficient_ci95.map_or_else(
+                    || short(mu),
+                    |ends| format!("{}, of the scatter over the cycles alone", with_ends(mu, ends)),
+                );
+                format!("coefficient μ = {shown}")
             },
         );
         lines.push(format!("  friction limit μN: {}; {coefficient}", prefixed(limit, "N")));
